@@ -18,7 +18,7 @@ from sweeps.commands.cli import app
 from sweeps.commands.terminal import kernels, regions, watchdog
 from sweeps.commands.terminal.console import emit, note
 from sweeps.errors import InvalidOption, SweepError
-from sweeps.formats import extend
+from sweeps.formats import extend, tell_by
 
 from .commands import export as cli_export
 from .commands import match as cli_match
@@ -28,9 +28,10 @@ from .limits import memory
 if TYPE_CHECKING:
     import xarray as xr
 
+    from store.shape import Shape
     from sweeps.formats import Encoder, Made
 
-    from .formats import Format
+    from .formats import About, Format
     from .settings import Settings
     from .shapes.compiling import Compiling
 
@@ -244,10 +245,19 @@ def _formats() -> Mapping[str, Encoder]:
     from sweeps.formats import Encoder
 
     from .formats import FORMATS
-    from .sequences import EXPORTS
+    from .sequences import EXPORTS, STILLS
 
     clips = {e.suffix: partial(_clip, e.name) for e in EXPORTS.values() if not e.single and e.suffix.count(".") == 1}
-    known = {f.suffix: Encoder(f.fields, partial(_encode, f), True, clips.get(f.suffix)) for f in FORMATS.values()}
+    known = {
+        f.suffix: Encoder(
+            f.fields,
+            partial(_encode, f),
+            True,
+            clips.get(f.suffix),
+            later=f.suffix if f.name in STILLS else ".glb",
+        )
+        for f in FORMATS.values()
+    }
     runs = {s: Encoder(("position",), partial(_whole, clip), True, clip, runs=True) for s, clip in clips.items()}
     return {**runs, **known}
 
@@ -264,11 +274,24 @@ def _whole(clip: Callable[[xr.Dataset], bytes], made: Made) -> bytes:
 
 
 def _encode(chosen: Format, made: Made) -> bytes:
+    about = _about(made)
+    # as over HTTP, where glTF alone says how long r1 is
+    return chosen.encode(made.shapes[0], replace(about, metres=made.metres) if chosen.name == "glb" else about)
+
+
+def _about(made: Made) -> About:
     from .formats import About
 
-    about = About(made.solver, made.table, made.fixed, made.stage_symbol, made.units)
-    about = replace(about, shade=made.shade, reach=made.reach)
-    return chosen.encode(made.shapes[0], about)
+    about = About(made.solver, made.table, made.fixed, made.stage_symbol, made.units, made.detail)
+    return replace(about, made=made.made, shade=made.shade, reach=made.reach)
+
+
+def _told(shape: Shape, made: Made) -> Mapping[str, Any]:
+    """Return what the service says of a shape in an archive of NumPy."""
+    from .formats.about import extras, lattice
+
+    about = _about(made)
+    return {**extras(shape, about), "lattice": lattice(len(shape.colatitude), len(shape.azimuth), about)}
 
 
 def _part(text: str) -> regions.Part:
@@ -284,6 +307,7 @@ def _part(text: str) -> regions.Part:
 
 
 extend(_formats)
+tell_by(_told)
 regions.read_by(_part)
 cli_export.add_to(app)
 cli_scene.add_to(app)

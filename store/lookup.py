@@ -205,8 +205,7 @@ class ShapeTable:
         mixed = self._blender.mix(point, near, tuple(_stored(stages)), how)
         inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
         expected = self._expect(near, stages, how)
-        known = self._trust is not None and self._trust.knows(str(how))
-        trust.refuse(expected, max_error, inside, self._judged, known and len(stages) > 1)
+        trust.refuse(expected, max_error, inside, self._judged, self._knows(how) and len(stages) > 1)
         exact = s == 0 or (near.nearest == 0.0 and len(stages) == 1)
         found, crossings = self._fields(fields, patch, values, self._blend(point, mixed, stages, how, n), exact, apart)
         return Shape(
@@ -315,9 +314,13 @@ class ShapeTable:
     def _expect(self, near: Weighted, stages: Mapping[int, float], method: methods.Method) -> dict[str, float] | None:
         if stages.keys() == {_FRESH} or (near.nearest == 0.0 and len(stages) == 1):
             return dict.fromkeys(Measures._fields, 0.0)
-        if self._trust is None or not self._trust.knows(str(method)):
+        if self._trust is None or not self._knows(method):
             return None
         return self._trust.expect(near, stages)
+
+    def _knows(self, method: methods.Method) -> bool:
+        """Return whether the table knows errors of that method."""
+        return self._trust is not None and self._trust.knows(str(method))
 
     def _held(self, near: Weighted, stages: Mapping[int, float], n: int) -> float | None:
         """Return the share of the wrinkles' height (rms) in waves of degrees up to n: a lattice of n holds all of them,

@@ -20,7 +20,7 @@ from store.lookup import ShapeTable
 from store.store import Store
 from store.tables import TableInfo, path_of
 
-__all__ = ["covered", "drawn", "gallery", "portrait", "shade", "thumbnail"]
+__all__ = ["Said", "covered", "drawn", "gallery", "portrait", "said", "shade", "thumbnail"]
 
 #: Share of the way to the last stage at which a family's picture is taken: wrinkled, and not yet crumpled.
 _DRY = 0.67
@@ -91,6 +91,25 @@ def _kept(path: Path) -> _Kept:
         None if likeness is None else likeness.values.tolist(),
         None if judged is None else judged[1],
     )
+
+
+class Said(NamedTuple):
+    """What files say of a table's shapes: numbers that are the same in all of it, how its runs were done where that is
+    not the usual, and the units of its parameters and of the stage.
+    """
+
+    fixed: Mapping[str, float]
+    made: Mapping[str, Any]
+    units: Mapping[str, str]
+
+
+def said(solver: Solver, info: TableInfo) -> Said:
+    """Return what files say of the shapes of a table, in the words of answers over HTTP."""
+    # entries that no axis reaches are no names, and what is no number is said as how the runs were done
+    fixed = {k: float(v) for k, v in info.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
+    known, stage = solver.axis_units(), solver.stages
+    units = {name: known[name] for name in (*info.axes, *info.tied, *fixed) if name in known}
+    return Said(fixed, stored.made(info, solver), {**units, stage.symbol: stage.units})
 
 
 def portrait(store: Store, families: Families, info: TableInfo) -> tuple[dict[str, float], float]:

@@ -12,16 +12,17 @@ if TYPE_CHECKING:
     from solver.contract import Shade
     from store.shape import Shape
 
-__all__ = ["Encoder", "Made", "added", "extend"]
+__all__ = ["Encoder", "Made", "added", "extend", "tell_by", "told"]
 
 
 @dataclass(frozen=True)
 class Made:
     """What a command has to write: shapes by stage, what it says about them, and the whole run if there was one.
 
-    `table` and `fixed` are the look-up table's name and the parameters that are the same in all of it; `units` are
-    those of the parameters and of the stage, whose symbol is `stage_symbol`. `shade` is the skin of shapes of a table
-    whose stages `reach` so far. `cut` is the plane in which a picture shows the run cut open.
+    `table` and `fixed` are the look-up table's name and the numbers that are the same in all of it, `made` how its runs
+    were done where that is not the usual; `units` are those of the parameters and of the stage, whose symbol is
+    `stage_symbol`; `detail` says which part there is. `shade` is the skin of shapes whose stages `reach` so far and
+    `metres` the length of r1, if anybody knows them. `cut` is the plane in which a picture shows the run cut open.
     """
 
     shapes: Sequence[Shape]
@@ -37,6 +38,9 @@ class Made:
     cut: str | None = None
     shade: Shade | None = None
     reach: tuple[float, float] = (0.0, 1.0)
+    made: Mapping[str, Any] = field(default_factory=dict)
+    detail: Mapping[str, Any] = field(default_factory=dict)
+    metres: float | None = None
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,7 @@ class Encoder:
     """A format: the fields of a shape that it needs, and how to write. `single` formats hold one stage only.
 
     whole: how a run is written with all its stages, and on meshes of its own; runs: nothing but runs is written.
+    later: the suffix that a run on a mesh of its own is exported with where the format does not take it at once.
     """
 
     fields: tuple[str, ...]
@@ -51,9 +56,11 @@ class Encoder:
     single: bool = False
     whole: Callable[[xr.Dataset], bytes] | None = None
     runs: bool = False
+    later: str = ".glb"
 
 
 _more: list[Callable[[], Mapping[str, Encoder]]] = []
+_tellers: list[Callable[[Shape, Made], Mapping[str, Any]]] = []
 
 
 def extend(formats: Callable[[], Mapping[str, Encoder]]) -> None:
@@ -67,3 +74,13 @@ def added() -> dict[str, Encoder]:
     for formats in _more:
         known = {**formats(), **known}
     return known
+
+
+def tell_by(teller: Callable[[Shape, Made], Mapping[str, Any]]) -> None:
+    """Have `teller` say of a shape, as plain JSON values, what every file says besides the numbers: as over HTTP."""
+    _tellers.append(teller)
+
+
+def told(shape: Shape, made: Made) -> Mapping[str, Any]:
+    """Return what a file says of a shape besides its numbers; nothing where nobody from above says it."""
+    return _tellers[-1](shape, made) if _tellers else {}

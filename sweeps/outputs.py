@@ -21,7 +21,7 @@ from store.shape import Shape
 from store.surfaces import apart, spectra
 
 from .errors import InvalidOption
-from .formats import Encoder, Made, added
+from .formats import Encoder, Made, added, told
 
 if TYPE_CHECKING:
     from .pictures.sheet import Panel
@@ -35,33 +35,27 @@ _BEYOND = 1.6
 
 
 def _npz(made: Made) -> bytes:
+    """Return a run's variables by name; of looked-up shapes arrays whose first axis are the stages, and as `about` what
+    other files say of each, as JSON texts.
+    """
     out = io.BytesIO()
     if made.run is not None:
         arrays: dict[str, Any] = {str(name): made.run[name].values for name in made.run.variables}
         np.savez_compressed(out, **arrays)
         return out.getvalue()
     first = made.shapes[0]
-    if first.position is not None and first.poles is None:  # a part is no closed mesh
-        np.savez_compressed(
-            out,
-            stage=np.array([shape.stage for shape in made.shapes]),
-            colatitude=first.colatitude,
-            azimuth=first.azimuth,
-            position=np.stack([shape.position for shape in made.shapes if shape.position is not None]),
-        )
-        return out.getvalue()
-    volumes = [np.nan if shape.volume is None else shape.volume for shape in made.shapes]
-    np.savez_compressed(
-        out,
-        stage=np.array([shape.stage for shape in made.shapes]),
+    found: dict[str, Any] = {"stage": np.array([shape.stage for shape in made.shapes])}
+    if first.poles is not None:  # a part is no closed mesh
         # along its diagonals crossings are counted; the poles are the last two points
-        triangles=closed_lattice(len(first.colatitude)).astype(np.int32),
-        volume=np.array(volumes),
-        colatitude=first.colatitude,
-        azimuth=first.azimuth,
-        position=np.stack([shape.position for shape in made.shapes if shape.position is not None]),
-        poles=np.stack([shape.poles for shape in made.shapes if shape.poles is not None]),
-    )
+        found["triangles"] = closed_lattice(len(first.colatitude)).astype(np.int32)
+        found["volume"] = np.array([np.nan if shape.volume is None else shape.volume for shape in made.shapes])
+    found |= {"colatitude": first.colatitude, "azimuth": first.azimuth}
+    for name in ("position", "poles"):
+        stages = [getattr(shape, name) for shape in made.shapes]
+        if all(values is not None for values in stages):
+            found[name] = np.stack(stages)
+    found["about"] = np.array([json.dumps(told(shape, made), sort_keys=True) for shape in made.shapes])
+    np.savez_compressed(out, **found)
     return out.getvalue()
 
 
@@ -219,8 +213,8 @@ def fields_for(
         return encoder.fields
     if encoder.single and encoder.whole is None:
         raise InvalidOption(
-            f"--out {path}: a solver with meshes of its own is not written as {path.suffix if path else ''} at once.",
-            "Write .h5, then: wizen export FILE.h5 --out FILE.glb.",
+            f"--out {path}: a run on a mesh of its own is not written as {path.suffix if path else ''} at once.",
+            f"Write .h5, then: wizen export FILE.h5 --out FILE{encoder.later}.",
         )
     # what gives the mesh its colours comes along
     coloured = tuple(name for name in solver.looks.layers if name in known) if solver else ()
@@ -240,7 +234,7 @@ def save(path: Path, made: Made) -> None:
     if encoder is not None and encoder.single and "position" in encoder.fields and not made.shapes and whole is None:
         raise InvalidOption(
             f"--out {path}: a run on a mesh of its own is not written as {path.suffix} at once.",
-            "Write .h5, then: wizen export FILE.h5 --out FILE.glb.",
+            f"Write .h5, then: wizen export FILE.h5 --out FILE{encoder.later}.",
         )
     if encoder is None:
         assert made.run is not None

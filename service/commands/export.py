@@ -186,6 +186,8 @@ def _read(result: str, store: Path | None) -> xr.Dataset:
         if not path.is_file():
             raise InvalidOption(f"there is no file {result}.", "`wizen solve ... --out run.h5` writes one.")
         return shards.read(path)
+    if path.suffix and path.is_file():
+        raise InvalidOption(f"{result} holds no result: result files are .h5.", "Name one, or a key and --store.")
     if store is None:
         raise InvalidOption(f"{result[:80]!r} is no file.", "Name a result file (.h5), or a key's --store.")
     opened = Store.open(store)

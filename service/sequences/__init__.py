@@ -90,8 +90,9 @@ def prepared(run: xr.Dataset, options: Options, stage: float | None = None, sing
     near = min(range(len(whole)), key=lambda i: abs(whole.stages[i] - stage))
     # no nearness of nan and of infinite stages is more than a number
     if not math.isclose(whole.stages[near], stage, rel_tol=1e-9, abs_tol=1e-9):
-        advice = f"Take one of {', '.join(f'{s:g}' for s in whole.stages)}."
-        raise InvalidQuery.of([Wrong("stage", f"the result has no stage {stage:g}", advice)])
+        # of so many digits that what is advised is found
+        advice = f"Take one of {', '.join(f'{s:.12g}' for s in whole.stages)}."
+        raise InvalidQuery.of([Wrong("stage", f"the result has no stage {stage:.12g}", advice)])
     return whole.at(near)
 
 
@@ -107,7 +108,7 @@ def _opened(run: xr.Dataset, cut: str, stage: float | None, single: bool) -> xr.
             days = days[-1:] if stage is None else days[np.isclose(run["stage"].values, stage, rtol=1e-9, atol=1e-9)]
         return opened.opened(run.isel(stage=days) if len(days) and "vertex_count" not in run else run, where)
     except InvalidOption as error:
-        raise InvalidQuery.of([Wrong("cut", error.message, error.advice)]) from None
+        raise InvalidQuery.of([Wrong("cut", error.message.rstrip("."), error.advice)]) from None
 
 
 def write(sequence: Sequence, export: Export, options: Options) -> bytes:

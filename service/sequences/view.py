@@ -238,6 +238,8 @@ class Sequence:
             "solver": str(self.run.attrs.get("solver", "")),
             # a mesh of one's own is what the file is made of, and no parameter to be read
             "params": {name: value for name, value in self.params.items() if name != "mesh"},
+            # what was relaxed comes from a table
+            **({"start": start} if (start := json.loads(self.run.attrs.get("need", "{}")).get("start")) else {}),
             "stages": {"values": list(self.stages), "units": stage.get("units", "1"), "of": stage.get("long_name", "")},
             "units": {"length": self.length, **({"metres": self.unit} if self.unit else {})},
         }

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..errors import OutsideTable
-from ..families.match import compare
+from ..families.match import compare, same
 from ..manifest import TableInfo
 
 __all__ = ["check_names", "check_number", "settle", "settle_stage"]
@@ -17,8 +17,9 @@ __all__ = ["check_names", "check_number", "settle", "settle_stage"]
 _SLACK = 1e-9
 
 
-def settle(table: TableInfo, query: Mapping[str, float]) -> dict[str, float]:
-    """Return the query's value on every varying axis, in the table's order.
+def settle(table: TableInfo, query: Mapping[str, Any]) -> dict[str, float]:
+    """Return the query's value on every varying axis, in the table's order. What the table holds fixed, numbers and
+    others, may be said as it is.
 
     Raises:
         OutsideTable: a missing or unknown name, a value that is not finite, off its axis, or against what is fixed.
@@ -101,7 +102,9 @@ def _inside(name: str, value: Any, low: float, high: float, table: TableInfo) ->
 
 
 def _check_fixed(name: str, value: Any, fixed: Any) -> None:
-    if not isinstance(fixed, int | float):
-        raise OutsideTable(f"{name} cannot be chosen.", f"It is {fixed} in the whole table.")
-    if not math.isclose(check_number(name, value), fixed, rel_tol=_SLACK, abs_tol=1e-12):
-        raise OutsideTable(f"{name} = {value} is not in the table.", f"{name} is {fixed:g} in the whole table.")
+    if isinstance(fixed, int | float) and not isinstance(fixed, bool):
+        value, held = check_number(name, value), f"{fixed:g}"
+    else:
+        held = str(fixed)
+    if not same(value, fixed):
+        raise OutsideTable(f"{name} = {value} is not in the table.", f"{name} is {held} in the whole table.")

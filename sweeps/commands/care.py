@@ -104,7 +104,7 @@ def verify(
     recompute: Annotated[int, typer.Option("--recompute", min=0, metavar="N", help="Solve N of its runs again.")] = 0,
     seed: Annotated[int, typer.Option("--seed", min=0, help="Which runs are solved again.")] = 0,
     tolerance: Annotated[
-        float, typer.Option("--tolerance", min=0, help="Change of displacement [r1] allowed to other machines.")
+        float, typer.Option("--tolerance", min=0, help=r"Change of displacement \[r1] allowed to other machines.")
     ] = 0.0,
     as_json: As_json = False,
 ) -> None:

@@ -48,10 +48,10 @@ def score(
     ] = 0,
     as_json: As_json = False,
 ) -> None:
-    """Score the look-up methods by stage: against runs that the table has not seen, or leaving out its own.
+    r"""Score the look-up methods by stage: against runs that the table has not seen, or leaving out its own.
 
-    rgh: roughness over the true one. dB: error of band powers. W1: slopes' distributions [degree]. patch: variation of
-    local slope energy. L2nr, ang [degree] and corr: point by point. The method "seed" is the floor: how two runs
+    rgh: roughness over the true one. dB: error of band powers. W1: slopes' distributions \[degree]. patch: variation of
+    local slope energy. L2nr, ang \[degree] and corr: point by point. The method "seed" is the floor: how two runs
     differ whose seeds alone do.
 
     With --relax also the distance to equilibrium: the residual of a looked-up shape on the solver's mesh, how far 600

@@ -132,7 +132,9 @@ class _Asked:
 
 @grouped(_Asked)
 def query(asked: _Asked) -> None:
-    """Ask the tables for a shape between their samples, and write it as .obj, .glb, .npz or .png.
+    """Ask the tables for a shape between their samples, and write it.
+
+    --out takes one stage as .glb, .obj or .wzp (points alone), all of them as .npz, .png or .json (numbers about them).
 
     Presets fill what is not set. The table is the one that holds these parameters; where none does, the nearest is
     named, with what differs.
@@ -173,15 +175,20 @@ def query(asked: _Asked) -> None:
         "path": None if asked.out is None else str(asked.out),
         "stages": [{**_document(shape), **note} for shape, note in zip(shapes, notes, strict=True)],
     }
-    where = part(asked.region)
+    where, rows = part(asked.region), asked.resolution or table.resolution
     if where is not None:
-        document["region"] = where.said(asked.resolution or table.resolution)
+        document["region"] = where.said(rows)
     if asked.out is not None:
         place = ", ".join(f"{axis} = {value:g}" for axis, value in shapes[0].parameters.items())
         title = ": ".join(word for word in (asked.preset or name, place) if word)
-        made = Made(shapes, document, title, known.name, name, table.fixed, units=known.axis_units())
+        fixed, done, units = families.said(known, table.info)
+        made = Made(shapes, document, title, known.name, name, fixed, known.stages.symbol, units, made=done)
+        if where is not None:
+            part_of = {"resolution": rows, "waves": min(table.resolution, rows), "region": document["region"]}
+            made = replace(made, detail=part_of)
         shade = families.shade(known, table.info, stored.families(open_store(asked.store), known))
-        outputs.save(asked.out, replace(made, shade=shade, reach=table.reach))
+        metres = known.metres(table.at_parameters(shapes[0].parameters))
+        outputs.save(asked.out, replace(made, shade=shade, reach=table.reach, metres=metres))
     emit(document, asked.as_json, lambda console: _show(console, name, shapes, known.stages.symbol, asked.out))
 
 

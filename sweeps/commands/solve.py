@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from ..errors import InvalidOption
+from ..errors import InvalidOption, SweepError
 from .terminal.console import emit, note
 from .terminal.grouped import grouped
 from .terminal.options import (
@@ -61,7 +61,7 @@ class _Asked:
     under: Under = None
     quality: Quality = None
     tolerance: Annotated[
-        float | None, typer.Option("--tolerance", metavar="E", help="Relative error in place of a quality, e.g. 0.1.")
+        float | None, typer.Option("--tolerance", metavar="E", help="Relative error in place of a quality, e.g. 0.2.")
     ] = None
     fields: Annotated[
         str | None, typer.Option("--fields", metavar="NAME,...", help="What to keep; nothing else is computed.")
@@ -108,32 +108,65 @@ def solve(asked: _Asked) -> None:
 
     wizen solve wood --params examples/wood/knee.toml --quality preview --out knee.csv
     """
-    from solver.contract import budget
-    from store import shards
+    from solver.contract import SolverError, budget
 
-    from ..planning.plan import job
-    from .terminal.words import per_stage, show_run
+    from .terminal.words import show_run
 
     if asked.cut is not None:
         _check_cut(asked.cut, asked.out)
     chosen, params, need = _parsed(asked)
     if asked.max_seconds is not None:
         budget.within(chosen, (params,), need, asked.max_seconds)
-    spec = job(chosen, params, need)
-    result, seconds = _run(chosen, params, need)
-    document = {
+    begin = time.perf_counter()
+    try:
+        result = _run(chosen, params, need)
+    except SolverError as error:
+        if asked.out is not None and error.partial is not None:
+            _keep_settled(asked, chosen, params, need, error.partial)
+        raise
+    document = _told(asked, chosen, params, need, result) | {"seconds": round(time.perf_counter() - begin, 3)}
+    if asked.out is not None:
+        _save(asked.out, _title(asked, chosen), chosen, params, result, document, asked.cut)
+    emit(document, asked.as_json, lambda console: show_run(console, document, chosen.stages.symbol))
+
+
+def _told(asked: _Asked, solver: Solver, params: Parameters, need: Need, result: xr.Dataset) -> dict[str, Any]:
+    """Return what is told of a run, but for its seconds."""
+    from store import shards
+
+    from ..planning.plan import job
+    from .terminal.words import per_stage
+
+    spec = job(solver, params, need)
+    return {
         **{name: getattr(spec, name) for name in ("key", "solver", "version", "params", "need")},
         "digest": shards.digest(result),
-        "seconds": seconds,
         # what a solver has to say of how it ran
         "note": result.attrs.get("note"),
         "path": asked.out and str(asked.out),
         "stages": [float(stage) for stage in result["stage"]],
         "descriptors": per_stage(result),
     }
-    if asked.out is not None:
-        _save(asked.out, _title(asked, chosen), chosen, params, result, document, asked.cut)
-    emit(document, asked.as_json, lambda console: show_run(console, document, chosen.stages.symbol))
+
+
+def _keep_settled(asked: _Asked, solver: Solver, params: Parameters, need: Need, partial: xr.Dataset) -> None:
+    """Write the stages that a run settled before it failed, as a run that was asked for these alone."""
+    from solver.contract import SolverError, finish
+    from store.errors import StoreError
+
+    assert asked.out is not None
+    stages = tuple(float(stage) for stage in partial["stage"])
+    if not stages:
+        return
+    less = need.model_copy(update={"stages": stages})
+    # why the run failed is what counts, whatever else a file may want
+    with suppress(SolverError, StoreError, SweepError, OSError):
+        result = finish(partial.copy(), solver, params, less)
+        _save(
+            asked.out, _title(asked, solver), solver, params, result, _told(asked, solver, params, less, result), None
+        )
+        symbol = solver.stages.symbol
+        note(f"{symbol} = {', '.join(f'{stage:g}' for stage in stages)} settled before, and {asked.out} holds them")
 
 
 def _parsed(asked: _Asked) -> tuple[Solver, Parameters, Need]:
@@ -154,8 +187,8 @@ def _parsed(asked: _Asked) -> tuple[Solver, Parameters, Need]:
     return chosen, params, _for_file(asked.out, chosen, chosen.settle(need, asked.preset, (params,)))
 
 
-def _run(solver: Solver, params: Parameters, need: Need) -> tuple[xr.Dataset, float]:
-    """Return the result and the seconds it took; progress is shown, and an interrupt ends it well."""
+def _run(solver: Solver, params: Parameters, need: Need) -> xr.Dataset:
+    """Return the result; progress is shown, and an interrupt ends it well."""
     from solver.contract import Context
 
     from .. import tabled
@@ -164,10 +197,8 @@ def _run(solver: Solver, params: Parameters, need: Need) -> tuple[xr.Dataset, fl
     said = solver.remarks(params, need) if solver.remarks is not None else ""
     if said:
         note(f"note: {said}")
-    begin = time.perf_counter()
     with progress.one_run(solver.name) as observe, progress.stopping() as stop:
-        result = solver.solve(params, need, Context(observe, stop.is_set, shapes=tabled.shape))
-    return result, round(time.perf_counter() - begin, 3)
+        return solver.solve(params, need, Context(observe, stop.is_set, shapes=tabled.shape))
 
 
 def _for_file(out: Path | None, solver: Solver, need: Need) -> Need:
@@ -205,7 +236,7 @@ def _save(
     from .. import outputs
     from ..formats import Made
 
-    axes = {name: params.axis(name) for name in params.axes}
+    axes, plain = {name: params.axis(name) for name in params.axes}, params.model_dump(mode="json")
     is_whole = document["need"].get("region") is None
     count = result.sizes["stage"] if "position" in result and is_whole else 0
     made = Made(
@@ -214,10 +245,13 @@ def _save(
         title,
         solver.name,
         stage_symbol=solver.stages.symbol,
-        units=solver.axis_units(),
+        units={**solver.axis_units(), solver.stages.symbol: solver.stages.units},
         run=result,
         key=document["key"],
         cut=cut,
+        shade=solver.shade(plain),
+        reach=solver.stages.reach,
+        metres=solver.metres(plain),
     )
     try:
         outputs.save(out, made)

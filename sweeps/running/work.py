@@ -18,7 +18,7 @@ from typing import Any, Literal, Self
 import xarray as xr
 
 from solver import registry
-from solver.contract import Cancelled, Context, InvalidInput, Need, Solver, SolverError, finish
+from solver.contract import Cancelled, Context, InvalidInput, Need, Solver, SolverError, Unstable, finish
 from store import shards, starter
 from store.errors import CorruptShard, StoreError
 from store.ledger.jobs import Job, JobSpec
@@ -128,8 +128,8 @@ def work(task: Task) -> Outcome:
         said = describe(error)
         if error.partial is not None:
             said["partial"] = _quarantine(task, error.partial, str(error))
-        # what is wrong with the question stays wrong; anything else deserves a second try
-        return Outcome(job.key, "failed", retry=not isinstance(error, InvalidInput), error=said)
+        # what is wrong with the question stays wrong, and what blew up does so again: the same run gives the same bytes
+        return Outcome(job.key, "failed", retry=not isinstance(error, InvalidInput | Unstable), error=said)
     except StaleVersion as error:
         return Outcome(job.key, "failed", error=describe(error))
     except MemoryError:

@@ -20,7 +20,7 @@ from store.store import Store
 from sweeps.planning.plan import job
 
 from ._asking import checked
-from ._runs import splitting
+from ._runs import shrinking, splitting
 from .conftest import client_of
 
 
@@ -126,14 +126,14 @@ def test_the_service_sends_the_same_formats(stored: tuple[Store, str]) -> None:
     store, key = stored
     with client_of(store.root, jobs_workers=0, max_map=64) as client:
         url = f"/v1/jobs/{key}/result"
-        for accept, start in (
-            ("application/x-pc2", b"POINTCACHE2\0"),
-            ("model/vnd.usdc", b"PXR-USDC"),
-            ("image/png", b"\x89PNG"),
-            ("image/x-exr", b"\x76\x2f\x31\x01"),
-            ("model/x-ply", b"ply\n"),
+        for accept, start, said in (
+            ("application/x-pc2", b"POINTCACHE2\0", {}),
+            ("model/vnd.usdc", b"PXR-USDC", {}),
+            ("image/png", b"\x89PNG", {"size": 16}),
+            ("image/x-exr", b"\x76\x2f\x31\x01", {"size": 16}),
+            ("model/x-ply", b"ply\n", {}),
         ):
-            answer = client.get(url, params={"size": 16}, headers={"Accept": accept})
+            answer = client.get(url, params=said, headers={"Accept": accept})
             assert answer.content[: len(start)] == start
             assert answer.headers["content-type"] == accept
         film = client.get(url, headers={"Accept": "model/gltf-binary; stages=all"})
@@ -182,3 +182,21 @@ def test_what_is_no_stage_is_not_the_nearest_one(stored: tuple[Store, str], tmp_
     assert code == 2, said
     assert "has no stage" in said
     assert not out.exists()
+
+
+def test_a_file_that_is_no_result_is_not_said_to_be_no_file(tmp_path: Path) -> None:
+    (tmp_path / "a.glb").write_bytes(b"glTF")
+    code, said = run(str(tmp_path / "a.glb"), "--out", str(tmp_path / "a.obj"))
+    assert code == 2
+    assert "holds no result: result files are .h5" in " ".join(said.split())
+
+
+def test_a_stage_that_is_advised_is_found(tmp_path: Path) -> None:
+    path, out = tmp_path / "run.h5", str(tmp_path / "a.obj")
+    shards.write(path, shrinking().assign_coords(stage=[0.1, 0.10000001, 0.2]), "0" * 64)
+    code, said = run(str(path), "--out", out, "--stage", "0.15")
+    assert code == 2
+    advised = " ".join(said.split()).partition("Take one of ")[2].rstrip(".").split(", ")
+    assert advised == ["0.1", "0.10000001", "0.2"]
+    code, said = run(str(path), "--out", out, "--stage", advised[1], "--json")
+    assert (code, json.loads(said)["stages"]) == (0, [0.10000001])

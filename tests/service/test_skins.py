@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import colorsys
+import io
+import zipfile
 from pathlib import Path
 
 import httpx
@@ -14,12 +16,15 @@ from pxr import Usd, UsdGeom, UsdShade
 from typer.testing import CliRunner
 
 from service.cli import app
+from service.errors import UnfitFormat
 from solver import registry
 from store import starter
 from sweeps import outputs
 from sweeps.formats import Made
+from sweeps.pictures.colours import encoded
 from sweeps.pictures.render import View
 
+from . import _materialx
 from ._gltf import parsed
 from ._runs import made, shrinking
 from .conftest import client_of
@@ -125,6 +130,34 @@ def test_runs_leave_in_it_and_usd_changes_it_from_stage_to_stage() -> None:
     bare.GetRootLayer().ImportFromString(made(dried("sphere"), "usda").decode())
     prim = next(one for one in bare.Traverse() if one.IsA(UsdGeom.Mesh))
     assert not UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+
+
+def test_usdz_has_a_small_picture_of_the_skin_for_each_stage(tmp_path: Path) -> None:
+    path = tmp_path / "raisin.usdz"
+    path.write_bytes(made(dried("raisin"), "usdz", step=6, full=True))
+    stage = Usd.Stage.Open(str(path))
+    prim = next(one for one in stage.Traverse() if one.IsA(UsdGeom.Mesh))
+    material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+    assert _materialx.complaints(material) == ""
+    files = UsdShade.Shader(stage.GetPrimAtPath(f"{material.GetPath()}/diffuseColor")).GetInput("file").GetAttr()
+    assert list(files.GetTimeSamples()) == [1, 7, 13]
+    kept = UsdGeom.Mesh(prim).GetDisplayColorPrimvar()
+    with zipfile.ZipFile(path) as archive:
+        for at in files.GetTimeSamples():
+            pixels = np.asarray(Image.open(io.BytesIO(archive.read(files.Get(at).path)))).reshape(-1, 3)
+            assert np.ptp(pixels, axis=0).max() == 0
+            assert pixels[0] == pytest.approx(encoded(np.array(kept.Get(at)[0])), abs=1)
+    # what nobody knows stays bare, as in usdc; pictures of it cannot be had
+    path = tmp_path / "sphere.usdz"
+    path.write_bytes(made(dried("sphere"), "usdz"))
+    with zipfile.ZipFile(path) as archive:
+        assert archive.namelist() == ["result.usdc"]
+    stage = Usd.Stage.Open(str(path))
+    prim = next(one for one in stage.Traverse() if one.IsA(UsdGeom.Mesh))
+    assert UsdGeom.Mesh(prim).GetPointsAttr().GetNumTimeSamples() == 3
+    assert not UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+    with pytest.raises(UnfitFormat, match="textures need colours"):
+        made(dried("sphere"), "usdz", textures=64)
 
 
 def test_a_picture_of_a_run_has_its_fruit_s_hue() -> None:

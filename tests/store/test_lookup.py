@@ -188,6 +188,7 @@ def test_the_answer_cannot_be_changed(table: ShapeTable) -> None:
         ({"te": 0.04, "gamma": float("inf")}, "finite"),
         ({"te": 0.04, "gamma": 20, "rs1": 0.3}, "0.4 in the whole table"),
         ({"te": 0.04, "gamma": 20, "seed": 1}, "0 in the whole table"),
+        ({"te": 0.04, "gamma": 20, "imperfection_kind": "modes"}, "imperfection_kind is waves in the whole table"),
     ],
 )
 def test_queries_off_the_table(table: ShapeTable, query: dict[str, Any], word: str) -> None:
@@ -212,6 +213,14 @@ def test_queries_off_the_table(table: ShapeTable, query: dict[str, Any], word: s
 def test_needs_off_the_table(table: ShapeTable, options: dict[str, Any], word: str) -> None:
     with pytest.raises(OutsideTable, match=word):
         table.at({"te": 0.04, "gamma": 20}, **{"stage": 0.2, **options})
+
+
+def test_what_is_no_number_may_be_said_as_the_table_holds_it(table: ShapeTable) -> None:
+    held = {name: value for name, value in table.fixed.items() if not isinstance(value, int | float)}
+    assert held["imperfection_kind"] == "waves"
+    query = {"te": 0.033, "gamma": 20.0}
+    said = table.at({**query, **held}, 0.2)
+    np.testing.assert_array_equal(said.position, table.at(query, 0.2).position)
 
 
 def test_round_off_is_forgiven(table: ShapeTable) -> None:

@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
-from solver.contract import Cancelled, Context, Cost, InvalidInput, Need, NotConverged, Solver, StageAxis
+from solver.contract import Cancelled, Context, Cost, InvalidInput, Need, NotConverged, Solver, StageAxis, Unstable
 from solver.fresh import SURFACE
 from solver.fruit import Fruit, azimuths, colatitudes, lattice
 
@@ -29,7 +29,9 @@ class ShrinkingParams(Fruit):
 
     modulus_ratio: float = Field(10.0, ge=1, le=1000, description="of no consequence here")
     pause: float = Field(0.0, ge=0, description="Seconds that a stage takes")
-    trouble: str = Field("", description="What goes wrong: diverges, refuses, crashes, kills, hangs, once, waits")
+    trouble: str = Field(
+        "", description="What goes wrong: diverges, breaks, refuses, crashes, kills, hangs, once, waits"
+    )
 
 
 def _count(word: str) -> int:
@@ -73,6 +75,8 @@ def _trouble(params: ShrinkingParams, need: Need, context: Context, times: int) 
             raise NotConverged(
                 "it diverged.", advice="Take care.", partial=_result(params, need, (first,)), last_stage=first
             )
+        case "breaks":
+            raise Unstable("it blew up.", advice="Ask for less.")
         case "refuses":
             raise InvalidInput("it will not.", advice="Ask for something else.")
         case "crashes":

@@ -219,6 +219,20 @@ def test_a_sweep_that_fails_says_why(shrinking: Solves, tmp_path: Path, write_pl
     assert len(shrinking) == 4
 
 
+def test_a_solve_that_fails_writes_the_stages_before(shrinking: Solves, tmp_path: Path) -> None:
+    """As a run that was asked for these alone; and nothing where there is none."""
+    out, alone = tmp_path / "part.h5", tmp_path / "alone.h5"
+    failed = wizen("solve", "shrinking", "--set", "trouble=diverges", "--stages", "0.1,0.2", "--out", out)
+    assert failed.exit_code == 1
+    assert f"s = 0.1 settled before, and {out} holds them" in failed.stderr
+    with xr.open_dataset(out, engine="h5netcdf") as kept:
+        assert kept["stage"].values.tolist() == [0.1]
+        assert json.loads(kept.attrs["need"])["stages"] == [0.1]
+        assert kept["displacement"].dims[0] == "stage"
+    assert wizen("solve", "shrinking", "--set", "trouble=refuses", "--out", alone).exit_code == 2
+    assert not alone.exists()
+
+
 def test_a_solve_that_fails_has_exit_code_1(shrinking: Solves) -> None:
     result = wizen("solve", "shrinking", "--set", "trouble=diverges", "--json")
     assert result.exit_code == 1

@@ -36,7 +36,7 @@ def test_query_writes_a_part_of_what_it_writes_whole(table: Path, tmp_path: Path
     assert part_["position"].shape == (2, 4, 2, 3)
     np.testing.assert_allclose(part_["position"], full["position"][:, rows][:, :, columns], atol=1e-6)
     # it is no closed mesh, and does not say to be one
-    assert set(part_) == {"stage", "colatitude", "azimuth", "position"}
+    assert set(part_) == {"stage", "colatitude", "azimuth", "position", "about"}
 
 
 def test_query_says_which_part_in_a_document(table: Path, tmp_path: Path) -> None:

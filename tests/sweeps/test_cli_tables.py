@@ -124,6 +124,24 @@ def test_query(table: Path, tmp_path: Path) -> None:
     assert said["stages"][0]["volume"] == pytest.approx(inside, rel=1e-5)
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        ("--preset", "raisin", "--set", "mirrors=xz"),
+        ("--set", "te=0.01", "--set", "gamma=20", "--set", "mirrors=xyz"),
+        ("--set", "te=0.035", "--set", "gamma=20", "--set", "imperfection_kind=waves"),
+    ],
+)
+def test_how_a_table_s_runs_were_done_may_be_said_as_it_is(said: tuple[str, ...]) -> None:
+    asked = ("query", *said, "--stages", "0.2", "--resolution", 16, "--json")
+    found = document(wizen(*asked))
+    name, _, value = said[-1].partition("=")
+    assert found["parameters"][name] == value
+    other = wizen("query", "--name", found["table"], *said[:-1], f"{name}=other", "--stages", "0.2")
+    assert other.exit_code == 2
+    assert f"{name} is {value} in the whole table" in " ".join(other.stderr.split())
+
+
 def test_a_coarse_lattice_is_said_to_leave_wrinkles_out() -> None:
     thin = ("query", "--preset", "sphere", "--set", "te=0.01", "--stages", "0.1")
     said = "wrinkles' height that this lattice holds"

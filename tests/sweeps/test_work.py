@@ -38,6 +38,21 @@ def test_a_worker_of_another_version_refuses(shrinking: Solves, store: Store, ot
     assert len(shrinking) == 1
 
 
+@pytest.mark.parametrize(("trouble", "again"), [("breaks", False), ("refuses", False), ("diverges", True)])
+def test_what_would_come_out_the_same_is_not_tried_again(
+    shrinking: Solves, store: Store, trouble: str, again: bool
+) -> None:
+    """A run that blew up gives the same bytes, and takes as long."""
+    solver = registry.get("shrinking")
+    params, need = solver.parse({"trouble": trouble}), solver.settle(Need(stages=(0.1,), quality="preview"))
+    spec = JobSpec.of(solver, params, need)
+    store.ledger.want([spec], "one")
+    job = store.ledger.claim("somebody", 60.0, [spec.key])
+    assert job is not None
+    failed = work(Task(store.root, job, 60.0))
+    assert (failed.state, failed.retry) == ("failed", again)
+
+
 def test_what_comes_with_the_package_is_taken_over(
     shrinking: Solves, store: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -12,6 +12,7 @@ from ...errors import InvalidOption
 if TYPE_CHECKING:
     from solver.contract import Solver
     from store.lookup import ShapeTable
+    from store.manifest import TableInfo
     from store.store import Store
 
 __all__ = ["asked_table", "open_store", "run_command", "solver_of"]
@@ -63,9 +64,10 @@ def asked_table(
         fit = families.choose(said, stage, preset)
         if fit is None and (preset is not None or len(families.infos) > 1):
             # what no fruit can be is said before what no table holds
-            values = chosen.parse(said, preset)
+            values, near = chosen.parse(said, preset), families.nearest(said, stage, preset)
+            _check_stage(chosen, stage, near[0].info)
             chosen.settle(Need.parse({} if stage is None else {"stages": (stage,)}), preset, (values,))
-            error = stored.refusal(families.nearest(said, stage, preset))
+            error = stored.refusal(near)
             raise OutsideTable(
                 error.message, f"{error.advice} To run it: {run_command(chosen.name, preset, said, stage)}"
             )
@@ -78,6 +80,25 @@ def asked_table(
     # entries that no axis reaches are no names to ask by
     quiet = {key for key in asked if key not in said and (key in chosen.incidental or not key.isidentifier())}
     return table, {key: value for key, value in asked.items() if key not in quiet}
+
+
+def _check_stage(solver: Solver, stage: float | None, near: TableInfo) -> None:
+    """Refuse a stage that no run has, with what the nearest table holds: far less than runs have.
+
+    Raises:
+        InvalidInput: it is one.
+
+    """
+    from solver.contract import InvalidInput
+
+    axis = solver.stages
+    if stage is None or axis.lowest <= stage <= axis.highest:
+        return
+    low, high = near.reach
+    raise InvalidInput(
+        f"stage {stage:g} lies outside {axis.symbol} = {axis.lowest:g} to {axis.highest:g}, where runs are.",
+        advice=f"The nearest table, {near.name!r}, holds {low:g} to {high:g}.",
+    )
 
 
 def solver_of(store: Store, name: str | None, solver: str | None) -> Solver:
