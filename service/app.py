@@ -128,7 +128,7 @@ def create_app(settings: Settings | None = None, is_warmed: bool = False) -> Fas
     for router in (jobs.writing, jobs_meshes.router):
         app.include_router(router, responses=problems.responses(414))
     routers = (*guarded, catalogue.open_router, jobs.writing, jobs_meshes.router)
-    app.state.paths = sorted({route.path for router in routers for route in router.routes if isinstance(route, Route)})
+    app.state.routes = [route for router in routers for route in router.routes if isinstance(route, Route)]
     page.install(app, settings.page)
     if settings.metrics:
         app.add_api_route("/metrics", metrics.page, include_in_schema=False)

@@ -11,7 +11,7 @@ from starlette.responses import JSONResponse, Response
 from solver import __version__, quantities, registry
 from solver.contract import Solver
 from store.blending import methods
-from store.errors import CorruptTable
+from store.errors import CorruptTable, StoreError
 from store.tables import TableInfo
 
 from . import page, portraits, problems, vocabulary
@@ -49,7 +49,11 @@ def index(request: Request) -> Response:
         "solvers": "/v1/solvers",
         "shapes": "/v1/shapes/{solver}",
         "batches": "/v1/shapes:batch",
+        "scenes": "/v1/scenes",
+        "match": "/v1/match",
         "jobs": "/v1/jobs",
+        "results": "/v1/results",
+        "meshes": "/v1/meshes",
         "health": "/healthz",
         "documentation": "/docs",
         "schema": "/openapi.json",
@@ -133,9 +137,15 @@ def solvers() -> Json:
     response_model_exclude_unset=True,
     responses=problems.responses(404),
 )
-def solver(name: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Json:
+def solver(request: Request, name: str = Path(description="Name of a solver; GET /v1/solvers lists them")) -> Json:
     """Describe a solver: parameter schema, query axes and stage axis with units, fields, presets, looks, qualities."""
-    return _solver(vocabulary.solver_named(name))
+    known = vocabulary.solver_named(name)
+    links = {"jobs": link("/v1/jobs")}
+    try:
+        is_tabled = known.name in request.app.state.tables.solvers()
+    except StoreError:
+        is_tabled = False  # a solver can be told of without a store
+    return {**_solver(known), "links": {**({"shapes": link(f"/v1/shapes/{known.name}")} if is_tabled else {}), **links}}
 
 
 @router.get(
@@ -189,7 +199,6 @@ def _solver(solver: Solver) -> Json:
             for name, resolution in solver.default_resolution.items()
         },
         "session": _session(solver),
-        "links": {"shapes": link(f"/v1/shapes/{solver.name}")},
     }
 
 
@@ -246,7 +255,7 @@ def _table(request: Request, info: TableInfo) -> Json:
             "stored": info.stages,
             "neighbour_correlation": judged.neighbour_correlation,
         },
-        "methods": {"default": methods.DEFAULT, "known": methods.NAMED, "judged": judged.method},
+        "methods": {"default": methods.DEFAULT, "known": methods.OFFERED, "judged": judged.method},
         "descriptors": {name: quantities.attrs(name) for name in info.descriptors if name in quantities.QUANTITIES},
         "links": {
             "self": link(f"/v1/tables/{info.name}"),

@@ -80,9 +80,9 @@ class InvalidQuery(ServiceError):
     @classmethod
     def of(cls, wrong: Sequence[Wrong]) -> Self:
         """Return the error that lists every wrong parameter, with one sentence for all of them."""
-        message = "; ".join(f"{w.name}: {w.detail}" for w in wrong)
+        message = "; ".join(f"{w.name}: {w.detail.removesuffix('.')}" for w in wrong)
         advice = " ".join(dict.fromkeys(w.advice for w in wrong if w.advice))
-        return cls(f"{message}.", advice=advice, wrong=wrong)
+        return cls(message if message.endswith(("?", "!")) else f"{message}.", advice=advice, wrong=wrong)
 
 
 class OutsideRanges(InvalidQuery):

@@ -12,14 +12,12 @@ from solver.contract import InvalidInput, Solver
 
 from . import problems, vocabulary
 from .errors import InvalidQuery, Wrong
-from .shapes.query import number_of
+from .shapes.query import TIMES, number_of
 
-__all__ = ["NAMES", "UNDER", "router", "timed"]
+__all__ = ["UNDER", "router", "timed"]
 
 router = APIRouter(tags=["catalogue"])
 
-#: Names in a query that say when.
-NAMES = ("hours", "under")
 #: How conditions are written.
 UNDER = "[a-z_]+:[A-Za-z0-9.+-]+(,[a-z_]+:[A-Za-z0-9.+-]+)*"
 #: What to do where a name is given twice.
@@ -73,8 +71,8 @@ def timed(items: Sequence[tuple[str, str]], solver: Solver, preset: str | None =
         InvalidQuery: no hours, several of them, the stage beside them, or conditions that nobody measured.
 
     """
-    said = [(name, value) for name, value in items if name in NAMES]
-    kept = [(name, value) for name, value in items if name not in NAMES]
+    said = [(name, value) for name, value in items if name in TIMES]
+    kept = [(name, value) for name, value in items if name not in TIMES]
     if not said:
         return kept
     given, symbol = dict(said), solver.stages.symbol

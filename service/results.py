@@ -13,7 +13,7 @@ from store.store import Store
 from sweeps import results as stored
 from sweeps.errors import InvalidOption
 
-from . import problems
+from . import problems, vocabulary
 from .errors import InvalidQuery, Wrong
 from .views.addresses import link
 
@@ -43,7 +43,7 @@ class ResultList(BaseModel):
     damaged: list[str] = Field(description="Keys of results that cannot be read, and are left out")
 
 
-@router.get("/v1/results", summary="All results", responses=problems.responses(414, 422, 503))
+@router.get("/v1/results", summary="All results", responses=problems.responses(404, 414, 422, 503))
 def results(
     request: Request,
     solver: Annotated[str | None, Query(max_length=100, description="Only results of this solver")] = None,
@@ -64,6 +64,8 @@ def results(
         name = "where" if "--where" in error.message else "sort" if sort and sort[1:] in error.message else "where"
         detail = error.message.removeprefix("--where ").rstrip(".")
         raise InvalidQuery.of([Wrong(name, detail, error.advice)]) from None
+    if solver is not None and not rows:
+        vocabulary.solver_named(solver)  # results of a solver that is gone are still listed
     end = after + limit
     following = None
     if end < len(rows):

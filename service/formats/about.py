@@ -33,7 +33,7 @@ class About:
     `made` says how its runs were done where that is not the usual: mirror planes, a pattern that they start from.
     `units` are those of the parameters and the stage; `detail` says what was chosen of resolution, part and fields;
     `links` and `timings` [ms] appear in JSON alone. `shade` is its skin, if anybody knows it, over stages that `reach`
-    so far.
+    so far, `metres` the length of r1, if anybody knows it.
     """
 
     solver: str = ""
@@ -47,6 +47,7 @@ class About:
     made: Mapping[str, Any] = field(default_factory=dict)
     shade: Shade | None = None
     reach: tuple[float, float] = (0.0, 1.0)
+    metres: float | None = None
 
     def worn(self, stage: float) -> Worn | None:
         """Return what the skin is at a stage."""
@@ -66,7 +67,7 @@ def extras(shape: Shape, about: About) -> dict[str, Any]:
         **shape.trust(),
         "volume": shape.volume,
         "method": shape.method,
-        "units": {"length": LENGTH_UNIT, **about.units},
+        "units": {"length": LENGTH_UNIT, **({"metres": about.metres} if about.metres else {}), **about.units},
         **({"detail": dict(about.detail)} if about.detail else {}),
     }
 

@@ -27,10 +27,12 @@ def encode(shape: Shape, about: About) -> bytes:
     `expected_error` how far it may be off by measure, null where nobody knows.
     """
     whose = " (of the runs)" if shape.tier == "table" else ""
+    # what comes from a run brings none along
+    known = {name: QUANTITIES[name].units for name in shape.descriptors if name in QUANTITIES}
     described = {
         name: {
             "value": value,
-            "units": shape.units.get(name, "1"),
+            "units": shape.units.get(name) or known.get(name, "1"),
             "long_name": f"{QUANTITIES[name].long_name if name in QUANTITIES else name}{whose}",
         }
         for name, value in shape.descriptors.items()

@@ -48,14 +48,15 @@ def fields(
     check_done(job)
     store: Store = request.app.state.tables.store
     settings: Settings = request.app.state.settings
-    body = encode(store.get(job.key), names, stage, settings.max_export_samples)
+    body = encode(store.get(job.key), names, stage, settings.max_export_samples, called="names")
     return Response(body, media_type="application/json")
 
 
-def encode(run: xr.Dataset, names: str | None, stage: float | None, most: int) -> bytes:
+def encode(run: xr.Dataset, names: str | None, stage: float | None, most: int, called: str = "fields") -> bytes:
     """Return fields by name (with commas between; None: those of one number per stage), at one stage or at all.
 
-    Each has `dims`, `shape`, `units`, `long_name` and `values`, nested lists; coordinates are fields too.
+    Each has `dims`, `shape`, `units`, `long_name` and `values`, nested lists; coordinates are fields too. `called`
+    is what the asker's parameter of the names is called.
 
     Raises:
         InvalidQuery: no such field or stage, or more than `most` numbers.
@@ -65,7 +66,7 @@ def encode(run: xr.Dataset, names: str | None, stage: float | None, most: int) -
     asked = [name for name in known if run[name].dims == ("stage",)] if names is None else names.split(",")
     unknown = [name for name in asked if name not in known]
     if unknown:
-        wrong = [Wrong("fields", f"the result has no {name[:40]!r}", f"Known: {', '.join(known)}.") for name in unknown]
+        wrong = [Wrong(called, f"the result has no {name[:40]!r}", f"Known: {', '.join(known)}.") for name in unknown]
         raise InvalidQuery.of(wrong)
     if stage is not None:
         stages = run["stage"].values.tolist()
@@ -82,7 +83,7 @@ def encode(run: xr.Dataset, names: str | None, stage: float | None, most: int) -
     count = sum(run[name].size for name in asked)
     if count > most:
         advice = "Ask for fewer fields or one stage, or take the netCDF."
-        raise InvalidQuery.of([Wrong("fields", f"{count} numbers are more than {most}", advice)])
+        raise InvalidQuery.of([Wrong(called, f"{count} numbers are more than {most}", advice)])
     body = {
         "solver": run.attrs["solver"],
         "solver_version": run.attrs["solver_version"],

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 from urllib.parse import quote
 
@@ -12,23 +10,23 @@ from fastapi import APIRouter, Depends, Query, Request
 from starlette.responses import FileResponse, Response
 
 from solver import registry
-from solver.contract import Params, Solver, SolverError
-from solver.lattice import lattice
 from store import seal
 from store.errors import CorruptShard, UnknownJob
 from store.ledger.jobs import Job
 from store.store import Store
 from sweeps.pictures import colours
 
-from .. import problems, vocabulary
+from .. import problems
 from ..errors import InvalidQuery, NotAcceptable, Wrong
-from ..formats import FORMATS, About, Format
+from ..formats import FORMATS, Format
 from ..sequences import EXPORTS, STILLS, Export, Options, prepared, write
 from ..settings import Settings
 from ..views.shape import FieldsPage, ShapePage
 from ..views.tags import matches
+from . import choices
 from . import fields as jobs_fields
 from .routes import JobId, check_done, stored_job
+from .staged import encode, is_surface
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -116,14 +114,13 @@ def result(
     """
     job = stored_job(request, id)
     chosen = _negotiate(request.headers.get("accept"), format)
+    name = chosen.name if chosen else "netcdf"
+    choices.check(name, options.model_fields_set, stage=stage, fields=fields)
     check_done(job)
     store: Store = request.app.state.tables.store
-    name = chosen.name if chosen else "netcdf"
-    settings = request.app.state.settings
+    settings: Settings = request.app.state.settings
     asked = options.model_dump(exclude_defaults=True)
-    said = {"stage": stage, "fields": fields, **asked}
-    word = "".join(f"-{key}={value!r}" for key, value in sorted(said.items()) if value is not None)
-    tag = f'"{job.digest}-{name}{"" if chosen is None else quote(word, safe="=-")}"'
+    tag = _tag(job, name, {"stage": stage, "fields": fields, **asked})
     headers = {
         "ETag": tag,
         "Vary": "Accept",
@@ -136,28 +133,37 @@ def result(
     if chosen is None:
         return _shard(store, job, headers)
     run = store.get(job.key)
-    if chosen.name == "json" and (fields is not None or not _is_surface(run, job)):
+    if chosen.name == "json" and (fields is not None or not is_surface(run, job)):
         body = jobs_fields.encode(run, fields, stage, settings.max_export_samples)
     elif isinstance(chosen, Export) or (chosen.name in STILLS and _is_scene(run, asked)):
         body = _scene(run, stage, chosen, options, settings)
     else:
-        body = _shape(run, job, stage, chosen)
+        body = encode(run, job, stage, chosen)
     if matches(held, tag):  # whether there is such a file of it is known when it is made
         return Response(status_code=304, headers=headers)
     if chosen.name != "json":
-        headers["Content-Disposition"] = f'attachment; filename="{job.solver}-{job.key[:12]}{chosen.suffix}"'
+        headers["Content-Disposition"] = f'attachment; filename="{_filename(run, job, stage, chosen)}"'
     return Response(body, headers=headers, media_type=chosen.media_type.partition(";")[0])
+
+
+def _tag(job: Job, name: str, said: dict[str, Any]) -> str:
+    """Return the entity tag of a result in a format, with what was said about it."""
+    word = "".join(f"-{key}={value!r}" for key, value in sorted(said.items()) if value is not None)
+    return f'"{job.digest}-{name}{quote(word, safe="=-")}"'
+
+
+def _filename(run: xr.Dataset, job: Job, stage: float | None, chosen: Format | Export) -> str:
+    """Return what a file is called: with its stage where it holds one."""
+    if stage is None and isinstance(chosen, Export) and not chosen.single:
+        return f"{job.solver}-{job.key[:12]}{chosen.suffix}"
+    symbol = registry.get(job.solver).stages.symbol if job.solver in registry.names() else "stage"
+    at = float(run["stage"].values[-1]) if stage is None else stage
+    return f"{job.solver}-{job.key[:12]}-{symbol}{at:g}{chosen.suffix}"
 
 
 def _is_scene(run: xr.Dataset, asked: dict[str, Any]) -> bool:
     """Return whether a stage as glb or obj is more than the bare lattice: a mesh, colours, another scale."""
     return bool(asked) or "mesh_position" in run or bool(set(colours.looks(run).layers) & set(run.data_vars))
-
-
-def _is_surface(run: xr.Dataset, job: Job) -> bool:
-    """Return whether a result holds the whole surface on the lattice."""
-    whole = job.need.get("region") is None and {"colatitude", "azimuth"} <= set(run.dims)
-    return whole and ("position" in run or "displacement" in run)
 
 
 def _scene(
@@ -231,46 +237,3 @@ def _shard(store: Store, job: Job, headers: dict[str, str]) -> Response:
     if not whole:
         raise CorruptShard("the stored result is damaged.", "Delete its file; then ask for it again.")
     return FileResponse(path, headers=headers, media_type=NETCDF, filename=f"{job.solver}-{job.key[:12]}.h5")
-
-
-def _shape(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> bytes:
-    """Return one stage of a run in a format of the shapes.
-
-    Raises:
-        NotAcceptable: the result is no whole surface.
-        InvalidQuery: it has no such stage.
-
-    """
-    from sweeps.outputs import of_result
-    from sweeps.pictures.colours import shade
-
-    solver = vocabulary.solver_named(job.solver)
-    params = _params(solver, job)
-    stages = [float(value) for value in run["stage"].values]
-    wanted = stages[-1] if stage is None else stage
-    near = min(range(len(stages)), key=lambda i: abs(stages[i] - wanted))
-    if abs(stages[near] - wanted) > 1e-9 * max(1.0, abs(wanted)):
-        advice = f"Take one of {', '.join(f'{s:g}' for s in stages)}."
-        raise InvalidQuery.of([Wrong("stage", f"the result has no stage {wanted:g}", advice)])
-    if _is_surface(run, job) and "position" not in run and (fresh := solver.fresh(job.params)) is not None:
-        start = fresh.points(*lattice(run.sizes["colatitude"]))
-        run["position"] = run["displacement"] + start.astype(run["displacement"].dtype)
-    if not _is_surface(run, job) or "position" not in run:
-        advice = f"Ask for {NETCDF}; a job whose need has the field 'position' and no region is a shape."
-        raise NotAcceptable("this result is not a whole surface.", advice=advice)
-    axes = vocabulary.axes(job.solver)
-    shape = replace(of_result(run, {name: params.axis(name) for name in axes}, near), table=str(job.digest))
-    symbol = solver.stages.symbol
-    units = {**{name: axis.units for name, axis in axes.items()}, symbol: solver.stages.units}
-    skin = shade(job.solver, json.dumps(dict(job.params))) if chosen.name == "glb" else None
-    return chosen.encode(shape, About(job.solver, "", {}, symbol, units, shade=skin, reach=solver.stages.reach))
-
-
-def _params(solver: Solver, job: Job) -> Params:
-    try:
-        return registry.get(solver.name).parse(job.params)
-    except SolverError:
-        raise NotAcceptable(
-            f"the result is of version {job.version} of {solver.name}, whose parameters were others.",
-            advice=f"Ask for {NETCDF}.",
-        ) from None

@@ -21,6 +21,7 @@ from .. import problems, vocabulary
 from ..errors import Forbidden, JobEnded, JobFailed, NotDone
 from ..security import requires
 from ..views.addresses import link
+from . import strict
 from .submit import asker_of, submit
 from .views import JobList, JobRequest, JobView, view
 
@@ -52,9 +53,11 @@ def ask(request: Request, response: Response, body: JobRequest, token: Runner) -
     Parameters and need are checked by the solver itself before anything is queued. What was cancelled waits again; what
     was given up does with `again`.
     """
+    solver = vocabulary.solver_named(body.solver)
+    strict.check(solver, body.params)
     found = submit(
         request.app.state,
-        vocabulary.solver_named(body.solver),
+        solver,
         body.params,
         body.need,
         asker_of(request, token),

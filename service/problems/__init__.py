@@ -19,6 +19,7 @@ from fastapi.exceptions import RequestValidationError
 from pydantic import BaseModel, ConfigDict, Field
 from starlette.exceptions import HTTPException
 from starlette.responses import Response
+from starlette.routing import Route
 from starlette.types import Scope
 
 from solver import contract
@@ -102,6 +103,8 @@ STATUS: Mapping[type[Exception], int] = {
     errors.EngineDied: 500,
 }
 
+#: In the order in which they are named to whoever takes another one.
+_METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 _RETRY = {429: "10", 503: "5"}
 
 
@@ -202,7 +205,7 @@ def files(media_types: Iterable[str]) -> dict[str, Any]:
 
 
 def install(app: FastAPI) -> None:
-    """Make every error of `app` a problem; `app.state.paths` are the addresses that there are."""
+    """Make every error of `app` a problem; `app.state.routes` are the addresses that there are."""
     for root in (contract.SolverError, stored.StoreError, errors.ServiceError):
         app.add_exception_handler(root, _known)
     app.add_exception_handler(RequestValidationError, _validation)
@@ -231,19 +234,28 @@ async def _http(request: Request, error: Exception) -> Response:
     status = error.status_code
     phrase = HTTPStatus(status).phrase
     detail, advice = str(error.detail), ""
-    path = request.url.path
+    path, headers = request.url.path, dict(error.headers or {})
     if status == 404:
-        known = [path for path in request.app.state.paths if "{" not in path]
+        known = sorted({route.path for route in request.app.state.routes if "{" not in route.path})
         near = difflib.get_close_matches(path, known, n=1)
         detail = f"there is nothing at {path}."
         advice = f"Did you mean {near[0]}? " if near else ""
         advice += "GET / lists what there is."
     elif status == 405:
-        allowed = (error.headers or {}).get("Allow", "GET")
+        allowed = _allowed(request) or headers.get("Allow", "GET")
         detail = f"{path} does not take {request.method}."
         advice = f"Use {allowed}."
+        headers["Allow"] = allowed
     code = phrase.lower().replace(" ", "-").replace("'", "")
-    return _response(request.scope, status, code, detail, advice, headers=error.headers)
+    return _response(request.scope, status, code, detail, advice, headers=headers)
+
+
+def _allowed(request: Request) -> str:
+    """Return the methods that an address takes; HEAD goes on as GET (`telemetry`)."""
+    found: list[Route] = request.app.state.routes
+    taken = {method for one in found if one.path_regex.match(request.scope["path"]) for method in one.methods or ()}
+    taken |= {"HEAD"} if "GET" in taken else set()
+    return ", ".join(method for method in _METHODS if method in taken)
 
 
 def _response(
@@ -263,7 +275,7 @@ def _response(
         status=status,
         detail=detail,
         advice=advice,
-        instance=quote(scope["path"]) + (f"?{query[:512]}" if query else ""),
+        instance=quote(scope["path"], safe="/:@!$'()*+,;=~") + (f"?{query[:512]}" if query else ""),
         request_id=scope.get("state", {}).get("request_id", ""),
         errors=list(wrong),
         **(more or {}),

@@ -22,8 +22,9 @@ from ..formats import Format, negotiate
 from ..hours import timed
 from ..settings import Settings
 from . import detail as level
+from . import naming
 from .live import LiveTables
-from .query import RESERVED, ShapeQuery, Words, number_of, parse
+from .query import ShapeQuery, Words, parse
 
 __all__ = ["Asked", "Found", "asked", "preset_of", "read", "table_for", "words_of"]
 
@@ -75,8 +76,7 @@ def table_for(request: Request, solver: str) -> Found:
             tables.belongs(name, solver)
             found = Found(name, preset, {} if preset is None else tables.families(known).values({}, preset))
         else:
-            items = timed(given.multi_items(), known, preset)
-            said = {k: number for k, v in items if k not in RESERVED and (number := number_of(v)) is not None}
+            said = naming.said(_items(request, known, preset), known)
             found = choose(tables.families(known), said, known.stages.symbol, preset)
         request.scope[_TABLE] = found
     assert isinstance(found, Found)
@@ -84,15 +84,25 @@ def table_for(request: Request, solver: str) -> Found:
 
 
 def choose(families: Families, said: Mapping[str, Any], symbol: str, preset: str | None) -> Found:
-    """Return which of several tables holds the numbers that are said, the stage among them."""
-    known = families.infos[0].places
-    numbers = {name: value for name, value in said.items() if name in known or name in families.infos[0].fixed}
+    """Return which of several tables holds the numbers and words that are said, the stage among them."""
+    places, fixed = families.infos[0].places, families.infos[0].fixed
+    known = {k: value for k, value in said.items() if k in places or k in fixed or isinstance(value, str)}
     stage = said.get(symbol)
-    fit = families.choose(numbers, stage, preset)
+    fit = families.choose(known, stage, preset)
     if fit is not None:
         return Found(fit.info.name, preset, families.filled(fit.info, preset))
-    fits = tuple(families.nearest(numbers, stage, preset))
-    return Found(fits[0].info.name, preset, families.filled(fits[0].info, preset), fits, tuple(numbers))
+    fits = tuple(families.nearest(known, stage, preset))
+    return Found(fits[0].info.name, preset, families.filled(fits[0].info, preset), fits, tuple(known))
+
+
+def _items(request: Request, solver: Solver, preset: str | None) -> list[tuple[str, str]]:
+    """Return the items of a request's query by the names that tables use, the stage among them.
+
+    Raises:
+        InvalidQuery: no hours or fields could be read so.
+
+    """
+    return naming.named(timed(request.query_params.multi_items(), solver, preset), solver)
 
 
 def preset_of(solver: Solver, name: str | None) -> str | None:
@@ -150,8 +160,8 @@ def read(request: Request, solver: str, only: Format | None = None, without: tup
     detail = level.read(given)
     unknown = [Wrong(name, "means nothing here", f"Ask /v1/shapes/{solver}.") for name in without if name in given]
     also = [*unknown, *detail.refused(chosen)]
-    items = timed(given.multi_items(), known, found.preset)
-    query = parse(items, words, also, found.filled, beyond(found, words))
+    items = _items(request, known, found.preset)
+    query = parse(items, words, also, found.filled, beyond(found, words), found.preset)
     resolution = detail.resolution(query.resolution, table.resolution, settings.max_resolution)
     return Asked(known, found, table, words, query, detail, chosen, resolution)
 
@@ -171,7 +181,7 @@ def beyond(found: Found, words: Words) -> list[Wrong]:
 
 
 def words_of(solver: Solver, table: ShapeTable, max_resolution: int, tables: LiveTables) -> Words:
-    """Return what may be asked of a table. Fixed parameters may be named too: those that are plain numbers.
+    """Return what may be asked of a table. Fixed parameters may be named too: plain numbers, and words.
 
     Raises:
         StaleTable: it is of another version of the solver.
@@ -181,6 +191,8 @@ def words_of(solver: Solver, table: ShapeTable, max_resolution: int, tables: Liv
     described = vocabulary.axes(solver.name)
     fixed = {k: float(v) for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
     texts = {k: v for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, str)}
+    # what a table says nothing of is as usual: parameters are written only where they differ
+    texts = {**{k: v for k, v in naming.words(solver.params).items() if k not in table.fixed}, **texts}
     units = {name: described[name].units for name in (*table.axes, *table.info.tied, *fixed) if name in described}
     return Words(
         axes=table.axes,

@@ -29,7 +29,7 @@ from .batch_detail import Asked
 from .batch_formats import Batch
 from .batch_request import BatchRequest, expand
 from .live import LiveTables
-from .query import RESERVED, ShapeQuery, Words, parse
+from .query import RESERVED, ShapeQuery, Words, method_of, parse
 
 __all__ = ["router"]
 
@@ -67,7 +67,7 @@ def batch(request: Request, body: BatchRequest) -> Response:
     detail = level.read(body.detail)
     # what is wrong with all of them is said first, and alone: it would hide what is wrong with some
     _check_count(len(entries), settings)
-    wrong = [*detail.refused(chosen), *_off(body, settings)]
+    wrong = [*detail.refused(chosen), *_off(body, settings), *_unknown_method(body.method)]
     if wrong:
         raise InvalidQuery.of(wrong)
     levels, off = batch_detail.levels(entries, body, table.resolution, settings.max_resolution)
@@ -90,8 +90,12 @@ def batch(request: Request, body: BatchRequest) -> Response:
         point, stage = one.query.point, one.query.stage
         return table.at(point, stage, resolution=one.resolution, fields=fields, window=detail.window, **options)
 
+    def about_one(one: Asked) -> About:
+        metres = solver.metres(table.at_parameters(one.query.point)) if chosen.name == "glb" else None
+        return replace(about, detail=one.said, metres=metres)
+
     def look_up() -> Iterator[tuple[Shape, About]]:
-        yield from batch_detail.each_once(distinct, sent, at, lambda one: replace(about, detail=one.said))
+        yield from batch_detail.each_once(distinct, sent, at, about_one)
 
     about = words.about(body.solver, name)
     rest = (rows if body.once else None, detail.window, fields, look_up)
@@ -178,6 +182,11 @@ def _check_size(detail: level.Detail, resolutions: list[int], settings: Settings
         raise BatchTooLarge.of([Wrong("points", f"{said} {settings.max_batch_samples}", advice)])
 
 
+def _unknown_method(name: str | None) -> list[Wrong]:
+    found = method_of(name) if name is not None else ""
+    return [found] if isinstance(found, Wrong) else []
+
+
 def _off(body: BatchRequest, settings: Settings) -> list[Wrong]:
     if body.resolution is None or body.resolution <= settings.max_resolution:
         return []
@@ -195,12 +204,14 @@ def _queries(entries: list[Mapping[str, float]], words: Words, found: Found, off
     """
     wrong: list[Wrong] = list(off)
     queries, only_outside = [], not off
+    numbers = words._replace(texts={})  # points hold no words
     for i, entry in enumerate(entries):
         own = {name: value for name, value in entry.items() if name not in batch_detail.NAMES}
         common = [Wrong(n, "is not a parameter of one shape", "Give it for all.") for n in RESERVED if n in own]
         try:
             items = [(name, repr(value)) for name, value in own.items()]
-            query = parse(items, words, common, found.filled, beyond(found, words))
+            how = (found.filled, beyond(found, words), found.preset, batch_detail.NAMES)
+            query = parse(items, numbers, common, *how)
         except InvalidQuery as error:
             only_outside = False
             wrong += batch_detail.entry(i, error.wrong)

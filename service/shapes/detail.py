@@ -67,13 +67,17 @@ class Detail(NamedTuple):
         """Return the one named, else the one for the screen, else the table's own."""
         return min(self.cells or own, highest) if named is None else named
 
+    def _pixels(self, resolution: int) -> float:
+        """Return how many pixels a cell facing the eye covers at most: more than wanted where a limit cut it short."""
+        return round(PIXELS_PER_CELL * max((self.cells or 0) / resolution, 1), 3)
+
     def said(self, resolution: int, band: int) -> dict[str, Any]:
         """Return what was chosen, as plain JSON values, of a table whose waves reach to `band`."""
         if self == _ALL:
             return {}
         said: dict[str, Any] = {"resolution": resolution, "waves": min(band, resolution)}
         if self.cells is not None:
-            said |= {"chosen_by": "screen_px", "pixels_per_cell": PIXELS_PER_CELL, "wanted": self.cells}
+            said |= {"chosen_by": "screen_px", "pixels_per_cell": self._pixels(resolution), "wanted": self.cells}
         if self.region:
             patch = self.window.on(resolution)
             said["region"] = {"degrees": self.region, "rows": [patch.top, patch.height]}
@@ -95,7 +99,8 @@ def parameters() -> dict[str, tuple[str, Mapping[str, Any]]]:
     return {
         "screen_px": (
             "Chooses the resolution, in place of `resolution`: pixels that the fruit's diameter fills, or with "
-            f"`distance` the picture's height. Cells facing the eye then cover {PIXELS_PER_CELL:g} pixels at most.",
+            f"`distance` the picture's height. Cells facing the eye then cover {PIXELS_PER_CELL:g} pixels at most; "
+            "more where the service allows no finer lattice, as `pixels_per_cell` of the answer's `detail` says.",
             {**positive, "examples": [600]},
         ),
         "distance": ("From the eye to the fruit's nearest point [r1]; needs screen_px", {**positive, "examples": [3]}),

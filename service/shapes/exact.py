@@ -5,21 +5,23 @@ Between table and run lies what the table gives, relaxed by its solver: a job as
 
 from __future__ import annotations
 
+import json
+import shlex
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import urlencode
 
 from fastapi import Request
 from starlette.responses import Response
 
-from solver.contract import InvalidInput, Need, Start
+from solver.contract import InvalidInput, Need, Params, SolverError, Start
 from store.errors import TooUncertain
 from store.families.stored import document, refusal
 from store.starter import is_starter
-from sweeps.commands.terminal.tables import run_command
+from store.surfaces.window import WHOLE
 from sweeps.relaxing import lattice_of
 
-from ..errors import OutsideRanges, Uncertain
+from ..errors import InvalidQuery, OutsideRanges, Uncertain, Wrong
 from ..jobs.submit import asker_of, submit
 from ..security import authorize, bearer
 from ..settings import Settings
@@ -35,8 +37,10 @@ RESPONSE: dict[str, Any] = {
 }
 
 _OFFER = "With exact=run and a token of the scope run, the service runs exactly this."
+_WHOLE = "With exact=run and a token of the scope run, the service runs this fruit, whole."
 #: The tables that come with wizen take no results.
 _BY_HAND = "Run it by the command under links: this service stores nothing new."
+_WITHOUT = "The table's runs have {} besides, which that command cannot have: its wrinkles come to lie elsewhere."
 
 #: Parameters that a refusal tells one by one.
 _MANY = 3
@@ -63,21 +67,36 @@ def offered(request: Request, asked: Asked, error: OutsideRanges | TooUncertain)
 
 
 def _ways(request: Request, asked: Asked) -> tuple[dict[str, str], str]:
-    """Return the ways to a run of a question by their names, and which to go in words; none where no run can be."""
+    """Return the ways to a run of a question by their names, and which to go in words; none where no run can be.
+
+    All of them lead to one run: a command that cannot be that one is offered where there is no other way, and told of.
+    """
     try:
         params, preset = _run(asked)
         values = asked.solver.parse(params, preset)
         asked.solver.settle(_need(asked), preset, (values,))
     except InvalidInput as error:
         return {}, f"No run can be like that either: {error}"
-    said = {name: value for name, value in asked.query.said.items() if name != asked.words.stage}
-    links = {"command": run_command(asked.solver.name, asked.found.preset, said, asked.query.stage)}
+    typed = _command(asked, values)
     settings: Settings = request.app.state.settings
     if is_starter(settings.store):
-        return links, _BY_HAND
-    kept = [(name, text) for name, text in request.query_params.multi_items() if name != "exact"]
+        lacks = " and ".join(typed.lacks)
+        return {"command": typed.text}, f"{_BY_HAND} {_WITHOUT.format(lacks)}" if lacks else _BY_HAND
+    parts = {wrong.name for wrong in _parts(asked)}
+    kept = [(name, text) for name, text in request.query_params.multi_items() if name not in {"exact", *parts}]
     address = link(request.scope["path"].removesuffix("/info"))
-    return {"exact": f"{address}?{urlencode([*kept, ('exact', 'run')])}", **links}, _OFFER
+    links = {"exact": f"{address}?{urlencode([*kept, ('exact', 'run')])}"}
+    return links if typed.lacks else {**links, "command": typed.text}, _WHOLE if parts else _OFFER
+
+
+def _parts(asked: Asked) -> list[Wrong]:
+    """Return which parts of a shape are asked for, that are looked up alone: a job's result is sent whole."""
+    given = {"region": asked.detail.region, "components": asked.detail.window.components != WHOLE.components}
+    # JSON measures positions, which a result has in any case
+    given["fields"] = asked.detail.fields is not None and asked.chosen.name != "json"
+    advice = "Leave it out, or leave exact out: a looked-up shape can be sent in part."
+    detail = "is of looked-up shapes, and exact leads to a whole one"
+    return [Wrong(name, detail, advice) for name, is_it in given.items() if is_it]
 
 
 def redirect(request: Request, asked: Asked) -> Response:
@@ -88,6 +107,7 @@ def redirect(request: Request, asked: Asked) -> Response:
     defaults. The quality is `default`.
 
     Raises:
+        InvalidQuery: a part of it is asked for.
         Unauthorized, Forbidden: the request has no token for it.
         InvalidInput: the solver cannot compute it either.
         TooCostly, QueueFull, ReadOnlyStore: as for any job.
@@ -104,6 +124,7 @@ def relax(request: Request, asked: Asked) -> Response:
     the same table is the same job: what was relaxed once is kept.
 
     Raises:
+        InvalidQuery: a part of it is asked for.
         Unauthorized, Forbidden: the request has no token for it.
         InvalidInput: the solver relaxes nothing.
         StaleTable: the table is of another version of the solver.
@@ -122,6 +143,9 @@ def relax(request: Request, asked: Asked) -> Response:
 
 def _sent(request: Request, asked: Asked, params: Mapping[str, Any], need: Need, preset: str | None) -> Response:
     """Submit a job in the name of the request's token, and send its asker there."""
+    parts = _parts(asked)
+    if parts:
+        raise InvalidQuery.of(parts)
     token = authorize(request.app.state, bearer(request), "run")
     who, unlimited = asker_of(request, token), token.allows("admin")
     found = submit(request.app.state, asked.solver, params, need, who, preset=preset, unlimited=unlimited)
@@ -129,6 +153,13 @@ def _sent(request: Request, asked: Asked, params: Mapping[str, Any], need: Need,
     if found.job.state == "done":
         location += f"/result?{urlencode({'format': asked.chosen.name})}"
     return Response(status_code=303, headers={"Location": location, "Cache-Control": "no-store"})
+
+
+class _Command(NamedTuple):
+    """What to type; `lacks` names parameters of the run that no command line can say."""
+
+    text: str
+    lacks: tuple[str, ...]
 
 
 def _need(asked: Asked) -> Need:
@@ -145,5 +176,55 @@ def _run(asked: Asked) -> tuple[Mapping[str, Any], str | None]:
     """Return the parameters of the run of a question, and the preset that they go over."""
     query, table = asked.query, asked.table.info
     if query.is_elsewhere:
-        return {name: value for name, value in query.said.items() if name != asked.words.stage}, asked.found.preset
+        return _said(asked), asked.found.preset
     return {**table.template, **table.complete(query.point), **query.named}, None
+
+
+def _command(asked: Asked, run: Params) -> _Command:
+    """Return the command that solves what `_run` says, to the same key.
+
+    It names the preset and what was said, and then what the table's runs have besides. What refers to another run, as a
+    pattern does, takes a store, which `wizen solve` has none of.
+    """
+    wanted = _full(run)
+    preset, said = asked.found.preset, _said(asked)
+    try:
+        near = asked.solver.parse(said, preset)
+    except SolverError:
+        # only with what the table says besides is it a fruit
+        preset, said, near = None, {}, asked.solver.parse({})
+    known = _full(near)
+    rest = {name: value for name, value in wanted.items() if value != known[name]}
+    lacks = tuple(name for name, value in rest.items() if isinstance(value, Mapping))
+    # a whole field goes before its entries, which are said by their axes
+    over = {axis for axis, (field, _) in asked.solver.params.axes.items() if field in rest}
+    values = {name: value for name, value in said.items() if name not in over} | rest
+    words = ["wizen", "solve", asked.solver.name, *(["--preset", preset] if preset else [])]
+    for name, value in values.items():
+        if name not in lacks:
+            words += ["--set", f"{name}={_written(value)}"]
+    return _Command(shlex.join([*words, "--stages", _number(asked.query.stage), "--out", "shape.h5"]), lacks)
+
+
+def _full(params: Params) -> dict[str, Any]:
+    """Return all parameters as JSON values, those too that are written only where they are not as usual."""
+    usual = {name: field.default for name, field in type(params).model_fields.items() if not field.is_required()}
+    return {**usual, **params.model_dump(mode="json")}
+
+
+def _said(asked: Asked) -> dict[str, Any]:
+    return {name: value for name, value in asked.query.said.items() if name != asked.words.stage}
+
+
+def _written(value: Any) -> str:
+    """Return a value as `--set` reads it back, to the last digit."""
+    if isinstance(value, float):
+        return _number(value)
+    if isinstance(value, list) and value and all(isinstance(one, float | int) for one in value):
+        return ",".join(map(_written, value))
+    return value if isinstance(value, str) and value.isalpha() else json.dumps(value)
+
+
+def _number(value: float) -> str:
+    short = f"{value:.15g}"
+    return short if float(short) == value else repr(value)

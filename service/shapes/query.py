@@ -20,10 +20,23 @@ from ..errors import InvalidQuery, Wrong
 from ..formats import About
 from . import detail
 
-__all__ = ["EXACT", "LIMITS", "LOWEST_RESOLUTION", "RESERVED", "ShapeQuery", "Words", "number_of", "parse"]
+__all__ = [
+    "EXACT",
+    "LIMITS",
+    "LOWEST_RESOLUTION",
+    "RESERVED",
+    "TIMES",
+    "ShapeQuery",
+    "Words",
+    "method_of",
+    "number_of",
+    "parse",
+]
 
 #: Names that are not axes.
 RESERVED = ("resolution", "table", "preset", "format", "method", "max_error", "exact", *detail.NAMES)
+#: Names that stand in place of the stage.
+TIMES = ("hours", "under")
 
 #: What may be asked for beyond the table: a run of what it does not answer, or what it answers, relaxed.
 EXACT = ("run", "relax")
@@ -81,18 +94,19 @@ class ShapeQuery(NamedTuple):
     `named` are fixed parameters that were given all the same, and `outside` what is off the table: then `point`,
     `stage` and `named` are a question to the solver, not to the table. `method` is spelt in one way. `max_error` limits
     errors by measure. `exact`: what the table cannot answer is to be `run`, or what it answers to be `relax`ed. `said`
-    are the numbers that the asker named, and `is_elsewhere`: no table holds this fruit, whatever its skin and stage.
+    are the numbers and words that the asker named, and `is_elsewhere`: no table holds this fruit, whatever its skin and
+    stage.
     """
 
     point: dict[str, float]
     stage: float
     resolution: int | None
-    named: dict[str, float]
+    named: dict[str, float | str]
     outside: tuple[Wrong, ...] = ()
     method: str = methods.DEFAULT
     max_error: dict[str, float] | None = None
     exact: str = ""
-    said: Mapping[str, float] = {}
+    said: Mapping[str, float | str] = {}
     is_elsewhere: bool = False
 
 
@@ -102,11 +116,13 @@ def parse(
     also: Sequence[Wrong] = (),
     filled: Mapping[str, Any] | None = None,
     beyond: Sequence[Wrong] = (),
+    preset: str | None = None,
+    reserved: Sequence[str] = (*RESERVED, *TIMES),
 ) -> ShapeQuery:
     """Return the question that the decoded `items` of a query string ask; it may lie outside the table.
 
     `also` is what is wrong besides, `beyond` how the table is not the one that is asked for. `filled` are the
-    numbers of a preset, for what the asker does not say.
+    numbers of a `preset`, for what the asker does not say. `reserved` are the names that may be given besides.
 
     Raises:
         InvalidQuery: listing every name that is unknown, missing or repeated, and every value that cannot be used.
@@ -115,6 +131,7 @@ def parse(
     wrong, ranges = [*_repeated(items), *also], words.ranges
     outside: list[Wrong] = []
     numbers: dict[str, float] = {}
+    texts: dict[str, str] = {}
     chosen: dict[str, Any] = {"resolution": None}
     given = dict(items)
     for name, text in given.items():
@@ -131,12 +148,11 @@ def parse(
             else:
                 numbers[name] = number
         elif name in words.texts:
-            if text != words.texts[name]:
-                detail = f"this table holds {name} = {words.texts[name]!r} only, not {text[:40]!r}"
-                wrong.append(Wrong(name, detail, f"Leave {name} out, or run it: POST /v1/jobs."))
+            texts[name] = text
+            outside += _other(name, text, words.texts[name])
         elif name not in RESERVED:
-            wrong.append(_unknown(name, [*ranges, *words.tied, *words.fixed, *words.texts, *RESERVED]))
-    said = dict(numbers)
+            wrong.append(_unknown(name, [*ranges, *words.tied, *words.fixed, *words.texts, *reserved]))
+    said: dict[str, float | str] = {**numbers, **texts}
     if filled:
         known = {**ranges, **words.fixed, **words.tied}
         numbers = {**{name: value for name, value in filled.items() if name in known}, **numbers}
@@ -149,18 +165,33 @@ def parse(
         wrong.append(Wrong("max_error", "nobody knows the error of what is relaxed", "Leave it out."))
     if wrong:
         raise InvalidQuery.of([*wrong, *outside])
-    outside = _together(outside, beyond, said)
+    outside = _together(outside, beyond, said, preset)
     point = {name: numbers[name] for name in words.axes}
     named = {name: value for name, value in said.items() if name not in ranges}
     chosen |= {"said": said, "is_elsewhere": any(w.name not in ranges for w in outside)}
     return ShapeQuery(point, numbers[words.stage], named=named, outside=tuple(outside), **chosen)
 
 
-def _together(outside: Sequence[Wrong], beyond: Sequence[Wrong], said: Mapping[str, float]) -> list[Wrong]:
-    """Return what is off the table, each once; what nobody said is not theirs to leave out, as `beyond` knows."""
-    advice = {w.name: w.advice for w in beyond if w.name not in said}
+def _together(
+    outside: Sequence[Wrong], beyond: Sequence[Wrong], said: Mapping[str, float | str], preset: str | None
+) -> list[Wrong]:
+    """Return what is off the table, each once; what only a preset said is not the asker's to leave out."""
+    advice = {} if preset is None else {w.name: _of_preset(preset) for w in outside if w.name not in said}
+    advice |= {w.name: w.advice for w in beyond if w.name not in said}
     found = [w._replace(advice=advice.get(w.name, w.advice)) for w in outside]
     return [*found, *(w for w in beyond if w.name not in {w.name for w in found})]
+
+
+def _of_preset(preset: str) -> str:
+    return f"That is of the preset {preset}: choose another preset, or another table."
+
+
+def _other(name: str, text: str, held: str) -> list[Wrong]:
+    """Return what is wrong with a word that is not the one that the table holds, or nothing."""
+    if text == held:
+        return []
+    detail = f"this table holds {name} = {held!r} only, not {text[:40]!r}"
+    return [Wrong(name, detail, f"Leave {name} out, or choose another table.")]
 
 
 def _unknown(name: str, known: Sequence[str]) -> Wrong:
@@ -200,7 +231,9 @@ def _repeated(items: Sequence[tuple[str, str]]) -> list[Wrong]:
 
 
 def number_of(text: str) -> float | None:
-    """Return the finite number that a text is, None if it is none."""
+    """Return the finite number that a text is, None if it is none: in plain digits, not as programs write them."""
+    if "_" in text or not text.isascii():
+        return None
     try:
         number = float(text)
     except ValueError:
@@ -227,7 +260,7 @@ def _resolution(text: str, words: Words) -> int | Wrong:
     return rows
 
 
-def _method(text: str, words: Words) -> str | Wrong:
+def method_of(text: str) -> str | Wrong:
     """Return the one spelling of a method; a plus that came as a blank, as an unquoted one does, is one."""
     try:
         return str(methods.parse(text.replace(" ", "+")))
@@ -256,7 +289,7 @@ def _exact(text: str, words: Words) -> str | Wrong:
 
 _READERS: Mapping[str, Callable[[str, Words], Any]] = {
     "resolution": _resolution,
-    "method": _method,
+    "method": lambda text, words: method_of(text),
     "max_error": _max_error,
     "exact": _exact,
 }

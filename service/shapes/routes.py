@@ -174,6 +174,7 @@ def _answer(request: Request, asked: Asked) -> Response:
         detail=detail.said(resolution, table.resolution),
         links=_links(request, resolution, detail) if is_json else {},
         timings={"lookup": 1e3 * (looked - begin)} if is_json else {},
+        metres=solver.metres(table.at_parameters(query.point)) if chosen.name == "glb" else None,
     )
     body = chosen.encode(shape, about)
     encoded = time.perf_counter()
@@ -181,8 +182,7 @@ def _answer(request: Request, asked: Asked) -> Response:
     if is_json:
         return Response(body, headers={**headers, "Server-Timing": timing}, media_type=chosen.media_type)
     headers["Content-Disposition"] = f'attachment; filename="{_filename(solver.name, query, words.stage, chosen)}"'
-    headers["Content-Type"], headers["Content-Length"] = chosen.media_type, str(len(body))
-    wire = tuple((key.lower().encode("latin-1"), value.encode("latin-1")) for key, value in headers.items())
+    wire = _wire({**headers, "Content-Type": chosen.media_type, "Content-Length": str(len(body))})
     made = Answer(tag, (*wire, (b"server-timing", b"kept;desc=answered-before")), body)
     answers.keep(made)
     answers.remember(request.scope, solver, name, request.app.state.tables.families(solver), table.digest, tag)
@@ -195,6 +195,11 @@ class _Whole(Response):
     def __init__(self, answer: Answer) -> None:
         self.status_code, self.background = 200, None
         self.body, self.raw_headers = answer.body, list(answer.headers)
+
+
+def _wire(headers: Mapping[str, str]) -> tuple[tuple[bytes, bytes], ...]:
+    """Return headers as they go on the wire."""
+    return tuple((key.lower().encode("latin-1"), value.encode("latin-1")) for key, value in headers.items())
 
 
 def _tag(chosen: Format, name: str, digest: str, query: ShapeQuery, resolution: int, *detail: str) -> str:

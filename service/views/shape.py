@@ -53,9 +53,9 @@ class ShapePage(BaseModel):
 
     generator: str
     solver: str
-    table: str
-    digest: str = Field(description="Names the table's generation")
-    params: dict[str, Any] = Field(description="All parameters: those asked for, and what the table holds fixed")
+    table: str = Field(description="The table that it was looked up in, or relaxed from; empty of a run")
+    digest: str = Field(description="Names the table's generation, or a run's result")
+    params: dict[str, Any] = Field(description="All numbers: those asked for, and what the table or the run holds")
     made: dict[str, Any] | None = Field(None, description="How its runs were done where that is not the usual")
     stage: ShapeStage
     exact: bool = Field(description="A stored run at a stored stage, or the fresh shape")
@@ -77,7 +77,7 @@ class ShapePage(BaseModel):
         "the table does not say. What it lacks is no error in `expected_error`"
     )
     expected_error: dict[str, float | None] | None = Field(description="By measure; null where nobody knows")
-    method: str
+    method: str = Field(description="Of the look-up; empty of a run")
     units: dict[str, str]
     detail: dict[str, Any] | None = Field(None, description="What was chosen of resolution, part and fields")
     lattice: Lattice

@@ -6,6 +6,7 @@ import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -181,16 +182,21 @@ class Solver:
         asked = self.fresh({**plain, **values})
         if asked is None:
             return None
-        said = {name: self.parse({}, name).model_dump(mode="json") for name in self.presets}
-        angles = np.meshgrid(np.linspace(0, np.pi, 9), np.linspace(0, 2 * np.pi, 8, endpoint=False), indexing="ij")
-        points = asked.points(*angles)
-        shapes = {name: self.fresh(full) for name, full in said.items()}
-        alike = [name for name, one in shapes.items() if one and np.abs(one.points(*angles) - points).max() < _ALIKE]
+        said, shapes = self._known_presets
+        points = asked.points(*_angles())
+        alike = [name for name, one in shapes.items() if np.abs(one - points).max() < _ALIKE]
         if len({of(name) for name in alike}) > 1:
             full = {**plain, **values}
             alike = [n for n in alike if all(_same(said[n].get(f), full.get(f)) for f in self.presets[n])]
         found = {of(name) for name in alike}
         return found.pop() if len(found) == 1 else None
+
+    @cached_property
+    def _known_presets(self) -> tuple[Mapping[str, Mapping[str, Any]], Mapping[str, Floats]]:
+        """The presets' parameters, and points of the fresh shapes of those that have one: made once."""
+        said = {name: self.parse({}, name).model_dump(mode="json") for name in self.presets}
+        shapes = {name: one.points(*_angles()) for name, full in said.items() if (one := self.fresh(full)) is not None}
+        return said, shapes
 
     def axis_units(self) -> dict[str, str]:
         """Return the units of the scalar axes, from the parameters' schema."""
@@ -316,6 +322,11 @@ class Solver:
         settled = self.settle(asked, of=(params,))
         result = self.relax(params, position, stage, settled, context or Context(), steps)
         return finish(result, self, params, settled)
+
+
+def _angles() -> tuple[Floats, Floats]:
+    """Return colatitudes and azimuths at which fresh shapes are compared."""
+    return np.meshgrid(np.linspace(0, np.pi, 9), np.linspace(0, 2 * np.pi, 8, endpoint=False), indexing="ij")
 
 
 def _same(one: Any, other: Any) -> bool:

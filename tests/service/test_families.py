@@ -92,6 +92,76 @@ def test_how_a_run_was_done_may_be_named(client: httpx.Client) -> None:
     assert "exact=run or exact=relax" in client.get(SHAPE, params={**said, "exact": "foo"}).text
 
 
+@pytest.mark.parametrize(
+    ("said", "table", "name"),
+    [
+        ({"te": 0.035, "mirrors": "xyz"}, "sphere", "mirrors"),
+        ({"preset": "raisin", "mirrors": "x"}, "raisin", "mirrors"),
+        ({"te": 0.035, "imperfection_kind": "mode"}, "sphere", "imperfection_kind"),
+    ],
+)
+def test_a_word_that_no_table_holds_is_run(
+    client: httpx.Client, allowed: dict[str, str], said: dict[str, Any], table: str, name: str
+) -> None:
+    problem = checked(client.get(SHAPE, params={**said, "s": 0.2}), 422, "outside-table")
+    assert (problem["nearest"]["table"], [w["name"] for w in problem["errors"]]) == (table, [name])
+    assert f"--set {name}={said[name]}" in problem["links"]["command"]
+    run = client.get(problem["links"]["exact"], headers=allowed, follow_redirects=False)
+    assert client.get(run.headers["location"]).json()["params"][name] == said[name]
+
+
+def test_a_word_that_there_is_not_is_not_sent_to_a_run(client: httpx.Client, allowed: dict[str, str]) -> None:
+    said = {"te": 0.035, "s": 0.2, "imperfection_kind": "bumps"}
+    problem = checked(client.get(SHAPE, params=said), 422, "outside-table")
+    assert "links" not in problem
+    assert "No run can be like that either: imperfection_kind" in problem["advice"]
+    checked(client.get(SHAPE, params={**said, "exact": "run"}, headers=allowed), 422, "invalid-input")
+
+
+def test_parameters_are_named_as_on_the_command_line(client: httpx.Client) -> None:
+    plain = client.get(SHAPE, params={"te": 0.035, "s": 0.2, "format": "npz"})
+    for same in (
+        {"te": 0.035, "stone": "0.4,0.4"},
+        {"exocarp_thickness": 0.035},
+        {"te": 0.035, "radii": "1" + ",1" * 7},
+    ):
+        assert client.get(SHAPE, params={**same, "s": 0.2, "format": "npz"}).headers["etag"] == plain.headers["etag"]
+    for wrong, words in (
+        ({"stone": "0.4"}, "Write it like stone=0.4,0.4, or say rs1 and rs2."),
+        ({"radii": "2" + ",1" * 7}, "Write 1 there."),
+        ({"pattern": "x"}, "POST /v1/jobs"),
+        ({"exocarp_thickness": 0.03}, "Give it once."),
+    ):
+        problem = checked(client.get(SHAPE, params={"te": 0.035, "s": 0.2, **wrong}), 422, "invalid-query")
+        assert words in problem["advice"]
+
+
+def test_what_a_preset_says_is_not_the_askers_where_a_table_is_named(client: httpx.Client) -> None:
+    said = {"preset": "potato", "s": 0.2, "table": "raisin"}
+    problem = checked(client.get(SHAPE, params=said), 422, "outside-table")
+    assert "Leave" not in problem["advice"]
+    assert problem["advice"].count("That is of the preset potato: choose another preset, or another table.") == 1
+    again = client.get(SHAPE, params={**said, "rs1": 0.35}).json()["errors"]
+    assert "Leave rs1 out" in next(wrong["advice"] for wrong in again if wrong["name"] == "rs1")
+
+
+def test_what_names_there_are_is_said_where_they_work(client: httpx.Client) -> None:
+    problem = client.get(SHAPE, params={"preset": "raisin", "s": 0.2, "zzzz": 1}).json()
+    assert {"mirrors", "hours", "under", "preset"} <= set(problem["advice"].removeprefix("Known: ")[:-1].split(", "))
+    assert "Did you mean 'hours'?" in client.get(SHAPE, params={"preset": "raisin", "hour": 48}).text
+    body = {"solver": "dehydration", "preset": "raisin", "points": [{"s": 0.2, "zzzz": 1}]}
+    (wrong,) = client.post("/v1/shapes:batch", json=body).json()["errors"]
+    known = set(wrong["advice"].removeprefix("Known: ")[:-1].split(", "))
+    assert {"te", "gamma", "s", "seed", "screen_px"} <= known
+    assert not known & {"mirrors", "hours", "preset", "format", "method", "table"}
+
+
+@pytest.mark.parametrize("text", ["0_0.035", "\uff10.\uff10\uff13"])
+def test_numbers_are_plain_digits(client: httpx.Client, text: str) -> None:
+    problem = checked(client.get(SHAPE, params={"te": text, "s": 0.2}), 422, "invalid-query")
+    assert problem["errors"][0]["name"] == "te"
+
+
 def test_all_radii_typed_in_are_that_fruit(client: httpx.Client) -> None:
     radii = {f"r{i + 1}": r for i, r in enumerate(RAISIN["radii"]) if i}
     said = {**radii, "rs1": 0.3, "rs2": 0.2, "te": 0.01, "gamma": 10, "s": 0.2, "format": "json"}
@@ -107,7 +177,8 @@ def test_what_no_family_holds_names_the_nearest_and_the_run(
     assert (answer.status_code, problem["type"]) == (422, "urn:wizen:problem:outside-table")
     assert problem["nearest"]["table"] == "raisin"
     assert problem["nearest"]["parameters"] == {"te": {"asked": 0.03, "nearest": 0.02, "distance": 0.405465}}
-    assert problem["links"]["command"].startswith("wizen solve dehydration --preset raisin --set te=0.03 --stages 0.2")
+    typed = "wizen solve dehydration --preset raisin --set te=0.03 --set mirrors=xz --stages 0.2 "
+    assert problem["links"]["command"].startswith(typed)
     assert [wrong["name"] for wrong in problem["errors"]] == ["te"]
     store = Store.open(house)
     run = client.get(problem["links"]["exact"], headers=allowed, follow_redirects=False)

@@ -146,7 +146,7 @@ def test_unknown_paths_and_methods(faulty: httpx.Client) -> None:
     assert "Did you mean /v1/tables?" in problem["advice"]
     answer = faulty.post("/v1/tables")
     problem = checked(answer, 405, "method-not-allowed")
-    assert answer.headers["allow"] == "GET"
+    assert answer.headers["allow"] == "GET, HEAD"
     assert "Use GET" in problem["advice"]
 
 

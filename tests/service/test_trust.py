@@ -176,7 +176,7 @@ def test_the_catalogue_says_how_to_ask(client: httpx.Client, built: Path, own: S
     assert said["max_resolution"] == 512
     assert said["methods"] == {
         "default": methods.DEFAULT,
-        "known": list(methods.NAMED),
+        "known": list(methods.OFFERED),
         "judged": methods.DEFAULT,
     }
     likeness = ShapeTable.open(built, surfaces=registry.surface).neighbour_correlation

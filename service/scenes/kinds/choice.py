@@ -153,7 +153,7 @@ def _of_table(item: Item, tables: LiveTables, highest: int) -> list[Looked]:
     found = choose(tables.families(solver), said, symbol, preset)
     table = tables.get(found.name)
     words = words_of(solver, table, highest, tables)
-    query = parse([(k, repr(v)) for k, v in said.items()], words, [], found.filled, beyond(found, words))
+    query = parse([(k, repr(v)) for k, v in said.items()], words, [], found.filled, beyond(found, words), preset, ())
     if query.outside:
         raise InvalidQuery.of(query.outside)
     low, high = words.stages

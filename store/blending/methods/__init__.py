@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from ...errors import OutsideTable
 
-__all__ = ["CORRECTIONS", "DEFAULT", "NAMED", "SPLINED", "WEIGHTINGS", "Method", "parse"]
+__all__ = ["CORRECTIONS", "DEFAULT", "NAMED", "OFFERED", "SPLINED", "WEIGHTINGS", "Method", "parse"]
 
 WEIGHTINGS = ("idw", "nearest", "linear", "scattered", "thin", "lean")
 #: Those that pass splines through samples that share their pattern.
@@ -30,6 +30,8 @@ NAMED = (
     *("nearest", "idw", "idw+LL", "idw+LL+env", "linear", "linear+LL", "linear+LL+env"),
     *("thin", "thin+LL+env", "lean", DEFAULT),
 )
+#: Those that are named to askers: what nobody scores is there, too.
+OFFERED = (*NAMED, "scattered", "scattered+LL+env")
 
 
 class Method(NamedTuple):
@@ -55,7 +57,7 @@ def parse(name: str) -> Method:
         if part not in known:
             near = difflib.get_close_matches(part, known, n=1)
             hint = f"did you mean {near[0]!r}? " if near else ""
-            raise OutsideTable(f"there is no look-up method {name!r}.", f"{hint}Known: {', '.join(NAMED)}.")
+            raise OutsideTable(f"there is no look-up method {name!r}.", f"{hint}Known: {', '.join(OFFERED)}.")
     if len(set(rest)) < len(rest):
         raise OutsideTable(f"the method {name!r} names a correction twice.", "Name it once.")
     return Method(first, tuple(part for part in CORRECTIONS if part in rest))
