@@ -116,7 +116,7 @@ def export(asked: _Asked) -> None:
     sequence = prepared(run, options, asked.stage, chosen is None or chosen.single)
     bound = None
     with progress.one_run("export") as observe:
-        sequence = replace(sequence, observe=lambda share: observe(share, f"{share * len(sequence):.0f} stages"))
+        sequence = replace(sequence, observe=lambda share: observe(share, _counted(round(share * len(sequence)))))
         if asked.mesh is None:
             data = _written(sequence, chosen, options)
         else:
@@ -138,7 +138,7 @@ def export(asked: _Asked) -> None:
         _warn(bound)
 
     def show(console: Any) -> None:
-        console.print(f"{len(data) / 1e6:.3g} MB, {len(sequence)} stages, lengths in {sequence.length}", markup=False)
+        console.print(f"{len(data) / 1e6:.3g} MB, {_counted(len(sequence))}, lengths in {sequence.length}", markup=False)
         for name, value in document.get("mesh", {}).items():
             console.print(f"{name} {value:.3g}", markup=False)
         console.print(f"written to {out}", markup=False)
@@ -206,6 +206,10 @@ def _shown(run: xr.Dataset) -> xr.Dataset:
     note("the result was stored without its surface: it is solved again, which takes as long as it took.")
     with progress.one_run("solve") as observe, progress.stopping() as stop:
         return surfaced(run, Context(observe, stop.is_set, shapes=tabled.shape)) or run
+
+
+def _counted(stages: int) -> str:
+    return f"{stages} stage{'' if stages == 1 else 's'}"
 
 
 def _warn_of_threads(run: xr.Dataset, threads: int | None) -> None:
