@@ -24,7 +24,7 @@ ELLIPTIC: dict[str, dict[str, float]] = {"plum2": {}, "plum1": {}, "wolfberry": 
 
 #: The sphere that the road of fruits of any shape is tried on: stone, te, gamma.
 _SPHERE = (0.4, 0.04, 10)
-#: More of them, beside the reference's: thicker skins, on whose meshes waves of neighbouring degrees come almost at once.
+#: More of them, beside the reference's: thicker skins, on whose meshes neighbouring degrees come almost at once.
 _THICKER, _MODULI = (0.05, 0.06, 0.07, 0.08, 0.1), (10, 50)
 
 

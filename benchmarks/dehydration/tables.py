@@ -160,10 +160,11 @@ def _full(record: Row) -> str:
         finer = fine.get(row["fruit"]) if row["quality"] != "fine" else None
         against = "" if finer is None else f"{100 * (row['s_cr'] / finer - 1):+.2f} % (fine)"
         off = f"{100 * row['error']:+.2f} %" if row["error"] is not None else against
-        size = row["settings"]
+        size, exact = row["settings"], row.get("exact_degree", row["degree"])
+        degree = f"{row['degree']}" + f" (exact: {exact})" * (exact != row["degree"])
         lines.append(
             [
-                row["fruit"], row["quality"], f"{row['s_cr']:.5f}", off, str(row["degree"]), str(size["stacks"]),
+                row["fruit"], row["quality"], f"{row['s_cr']:.5f}", off, degree, str(size["stacks"]),
                 str(size["unknowns"]), f"{row['seconds']:.0f}", f"{row['cpu']:.0f}",
             ]
         )  # fmt: skip

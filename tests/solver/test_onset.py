@@ -115,6 +115,27 @@ def test_the_full_road_is_as_near_whatever_the_bulk_modulus(
     assert errors[0] == pytest.approx(errors[-1], abs=2e-4)
 
 
+@pytest.mark.parametrize(
+    ("te", "gamma"),
+    [
+        # a coarse mesh has degree 9 come first, and its first look at the other is so late that it is taken again
+        (0.06, 10.0),
+        (0.08, 50.0),
+        *(
+            pytest.param(te, gamma, marks=pytest.mark.slow)
+            for te in (0.04, 0.05, 0.06, 0.07, 0.08, 0.1)
+            for gamma in (10.0, 50.0)
+            if (te, gamma) not in ((0.06, 10.0), (0.08, 50.0))
+        ),
+    ],
+)
+def test_the_full_road_finds_the_first_of_modes_that_come_almost_at_once(te: float, gamma: float) -> None:
+    exact, found = (onset(sphere(0.4, te, gamma), road=road) for road in (None, "full"))  # type: ignore[arg-type]
+    assert found.s_cr == pytest.approx(exact.s_cr, rel=2e-3)
+    assert found.degree == exact.degree
+    assert [tie.s_cr for tie in found.ties] == sorted(tie.s_cr for tie in found.ties)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("preset", ["jujube2", "raisin"])
 def test_the_full_road_agrees_with_the_meridional_one_under_oblique_skins(preset: str) -> None:

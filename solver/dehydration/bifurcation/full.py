@@ -1,7 +1,8 @@
 """The onset of any fruit, elliptic equators too: triquadratic elements between the symmetry planes, all parities.
 
 Thin skins buckle first in one place, and only the patch that holds the mode is meshed finely; its edge follows a coarse
-smooth state. s_cr is the limit of two meshes by the order measured for each.
+smooth state. s_cr is the limit of two meshes by the order measured for each; all modes that may come first by what
+their waves' lengths say go to the finer mesh, for coarse ones make short waves come late.
 Cost: some six factors of each mesh; of whole parts, unknowns grow with 1 / thickness^2, of patches with 1 / thickness.
 """
 
@@ -21,7 +22,7 @@ from ..implicit import BaseState, Model, Patch
 from ..implicit.buckling import Crossing, Path, crossing, parities
 from ..params import DehydrationParams
 from .field import dominant, mode_heights, round_it
-from .looks import Look, elsewhere, even
+from .looks import SAME, Look, Pair, elsewhere, even
 from .places import expected_onsets
 from .result import FieldMode, Method, Onset, Tie
 from .rings import Rings
@@ -34,6 +35,8 @@ __all__ = ["crossings", "onset_full"]
 PER_WAVELENGTH = {"preview": (1.5, 2.1), "default": (2.0, 2.9), "fine": (2.9, 4.0)}
 #: The linear method's first modes are shorter (degree 23 instead of 14 on the sphere with te .04): it needs more.
 LINEAR_FINER = 1.6
+#: Elements per edge of the two meshes of a whole part, at least: on 4 and 6, degree 5 is .4 % off.
+LEAST = 6, 10
 #: Order of s_cr in element size of the whole part, measured on spheres, whose degrees are given: 3.0 to 3.5 between 1.9
 #: and 4.8 elements a wrinkle. Waves of a patch grow longer where short ones are too stiff: on plum 1 2.2 from 2.0 to 4
 #: elements a wrinkle and 2.7 from 2.9 to 5, on flat films (one column, phases at its sides) 2.3 to 2.9.
@@ -60,8 +63,6 @@ REACH, WIDER, LEFT = 3.3, 1.4, 0.45
 FEW, RIVALS, PLACES = 360, 1.05, 3
 #: Modes of other parities within this fraction above the first one are called ties.
 TIED = 0.05
-#: Onsets this close count as one.
-SAME = 5e-4
 #: How much coarser a patch may be along the crests than across.
 CRESTS = 1.2
 _TRIES = 14
@@ -136,7 +137,8 @@ def crossings(
     The part of `onset_full` that costs no search for the modes' degrees. Waves that run round the axis of a large mesh
     are looked for in bands of latitudes (see `rings`), and only there. Raises what it raises.
     """
-    search = _Search(params, method, kappa_ratio or PENALTY, context or Context())
+    # runs start from modes of quality preview: whose bytes change, that is another version of the solver
+    search = _Search(params, method, kappa_ratio or PENALTY, context or Context(), quality != "preview")
     if method == "exact" and not search.few(PER_WAVELENGTH[quality][0]):
         rings = Rings(params, search.states, search.places, search.context)
         if places := rings.bands(RIVALS):
@@ -146,10 +148,12 @@ def crossings(
 
 
 class _Search:
-    """One fruit and what is expected of its onset."""
+    """One fruit and what is expected of its onset. thorough: whether more than the coarse mesh's first goes on."""
 
-    def __init__(self, params: DehydrationParams, method: Method, kappa_ratio: float, context: Context) -> None:
-        self.params, self.method, self.context = params, method, context
+    def __init__(
+        self, params: DehydrationParams, method: Method, kappa_ratio: float, context: Context, thorough: bool
+    ) -> None:
+        self.params, self.method, self.context, self.thorough = params, method, context, thorough
         self.states = States(params, kappa_ratio, context)
         self.wavelength = flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio)
         # under stiffer skins waves are longer, but elements must not be longer than the skin is thick by more
@@ -171,36 +175,48 @@ class _Search:
         first = next(each for each in look.found if each.parity == first.parity)
         # where it does not matter, the parity whose factor is at hand
         best = first if first.shrinkage < (1 + SAME) * look.first.shrinkage else look.first
-        n = max(self._elements(look.patch, fine), len(look.model.mesh.quad_of[0]) + 2)
+        n = max(self._elements(look.patch, fine, 1), len(look.model.mesh.quad_of[0]) + 2)
         model = self.states.model(n, look.patch)
         guesses = {best.parity: elsewhere(self.params, look.model, best.mode, model)}
         self.below, self.unstable = FINE_LOOK * best.shrinkage, np.inf
-        last = self._repeated(model, guesses, 0.6, look.patch, look).first
-        ratio = n / len(look.model.mesh.quad_of[0])
-        order = ORDER if look.patch is None else PATCH_ORDER
-        limit = last.shrinkage - (best.shrinkage - last.shrinkage) / (ratio**order - 1)
-        others = [
-            Crossing(
-                max(each.shrinkage * limit / best.shrinkage, limit),
-                elsewhere(self.params, look.model, each.mode, model), each.parity,
-            )
-            for each in look.found
-            if each is not best and (1 + SAME) * best.shrinkage < each.shrinkage < (1 + TIED) * best.shrinkage
-        ]  # fmt: skip
-        return model, [each for each in (last._replace(shrinkage=limit), *others) if each.shrinkage <= SEARCHED]
+        last = self._repeated(model, guesses, 0.6, look.patch, look)
+        pair = Pair(look, last, ORDER if look.patch is None else PATCH_ORDER)
+        return model, [each for each in self._limits(pair) if each.shrinkage <= SEARCHED]
 
-    def _all(self, look: Look) -> Look:
-        """Return what the other parities show beside the even one."""
+    def _limits(self, pair: Pair) -> list[Crossing]:
+        """Return the limits of both meshes, sorted. Where thorough, all modes that may come first go to the finer."""
+        if self.thorough:
+            while (rival := pair.rival()) is not None:
+                guess = elsewhere(self.params, pair.coarse.model, rival.mode, pair.fine.model)
+                fine = self._all(pair.fine, {rival.parity: guess})
+                pair = pair._replace(fine=fine, asked=(*pair.asked, rival.parity))
+            modes, others = pair.limits(), pair.later(TIED)
+        else:
+            modes = pair.limits()
+            limit, best = modes[0].shrinkage, pair.coarse.of(modes[0].parity).shrinkage
+            others = [
+                each._replace(shrinkage=max(each.shrinkage * limit / best, limit))
+                for each in pair.coarse.found
+                if (1 + SAME) * best < each.shrinkage < (1 + TIED) * best
+            ]
+        moved = [
+            each._replace(mode=elsewhere(self.params, pair.coarse.model, each.mode, pair.fine.model)) for each in others
+        ]
+        return sorted([*modes, *moved], key=lambda each: each.shrinkage)
+
+    def _all(self, look: Look, wanted: Mapping[tuple[int, ...], Floats | None] | None = None) -> Look:
+        """Return what other parities show beside those seen: all that could differ, or those `wanted` by guesses."""
         for _ in range(_TRIES):
-            odd: dict[tuple[int, ...], Floats | None] = dict.fromkeys(look.others())
+            more = dict.fromkeys(look.others()) if wanted is None else wanted
             try:
-                more = self._seen(look.model, look.path, odd, 0.3)
+                found = self._seen(look.model, look.path, more, 0.3 if wanted is None else 0.7)
             except _AlreadyUnstable:
                 # one of them comes that much earlier
                 self._back(look.path.shrinkage)
-                look = self._repeated(look.model, {look.first.parity: look.first.mode}, 0.3, look.patch)
+                seen = {each.parity: each.mode for each in look.found}
+                look = self._repeated(look.model, seen, 0.3 if wanted is None else 0.7, look.patch)
             else:
-                return replace(look, found=sorted([look.first, *more], key=lambda each: each.shrinkage))
+                return replace(look, found=sorted([*look.found, *found], key=lambda each: each.shrinkage))
         raise self._lost()
 
     # ------------------------------------------------------------------------------------------------------ where
@@ -245,8 +261,11 @@ class _Search:
             model, patch = self.states.model(self._elements(None, per_wavelength), None), None  # type: ignore[assignment]
         return self._repeated(model, {even(model): None}, 0.05 + 0.02 * number, patch)
 
-    def _elements(self, patch: Patch | None, per_wavelength: float) -> int:
-        """Return the even number of elements per edge that has `per_wavelength` to a wrinkle where it counts."""
+    def _elements(self, patch: Patch | None, per_wavelength: float, mesh: int = 0) -> int:
+        """Return the even number of elements per edge that has `per_wavelength` to a wrinkle where it counts.
+
+        mesh: 0 for the coarse one, 1 for the finer.
+        """
         middles, onsets, widths, thinned, _ = self.places
         if patch is None:
             there = onsets <= RIVALS * onsets.min()
@@ -258,7 +277,8 @@ class _Search:
         size = len(self.states.whole.mesh.quad_of[0]) * float(max(across, along / CRESTS))
         if patch is None:
             size = max(size, np.pi / 2)
-        return max(2 * math.ceil(size * per_wavelength / self.resolved / 2), 4)
+        least = LEAST[mesh] if self.thorough and patch is None else 4
+        return max(2 * math.ceil(size * per_wavelength / self.resolved / 2), least)
 
     def _repeated(
         self, model: Model, wanted: Mapping[tuple[int, ...], Floats | None], done: float, patch: Patch | None = None,
@@ -287,6 +307,9 @@ class _Search:
         """Look from below what turned out unstable."""
         self.unstable = min(self.unstable, unstable)
         self.below = BACK * self.unstable
+        if self.thorough:
+            # moved on from .0466, the sphere with te .08, gamma 50 seemed to buckle at .0448, 2.8 % too early
+            self.states.forget()
 
     def _lost(self) -> NotConverged:
         return NotConverged("the onset was not bracketed.", advice="Ask for a finer quality.", last_stage=self.below)

@@ -149,6 +149,10 @@ class States:
         state, rate = known
         return BaseState(self.params, model, moved_on(state, rate, shrinkage)), rate.moved
 
+    def forget(self) -> None:
+        """Take the next smooth state anew: one past the onset turns too fast to be moved on or to lead other meshes."""
+        self._known = None
+
     @staticmethod
     def _tolerance(shrinkage: float) -> float:
         return SETTLED * min(1.0, shrinkage / 0.01)
