@@ -16,6 +16,7 @@ from pydantic import Field, field_validator, model_validator
 from .arrays import Floats
 from .contract import Params
 from .lattice import azimuths, colatitudes, directions, lattice, window
+from .rounding import towards_zero
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -43,6 +44,9 @@ class Fruit(Params):
         "rs1": ("stone", 0),
         "rs2": ("stone", 1),
         "te": ("exocarp_thickness", None),
+    }
+    no_axes: ClassVar[Mapping[str, str]] = {
+        "r1": "It is the unit of length, always 1: divide every other length by it."
     }
 
     radii: tuple[Radius, Radius, Radius, Radius, Radius, Radius, Radius, Radius] = Field(
@@ -98,12 +102,13 @@ class Fruit(Params):
         rays = self.sarcocarp(theta, phi)
         distance = np.linalg.norm(rays, axis=-1)
         flesh = float((distance - self.stone_distance(rays / distance[..., None])).min())
-        if flesh < MIN_FLESH:
+        # what is exactly enough may be less by a rounding
+        if flesh < MIN_FLESH * (1 - 1e-9):
             s1, s2 = self.stone
             where = "pokes through the fruit" if flesh < 0 else "leaves too little flesh"
             raise ValueError(
-                f"the stone {where} (thinnest flesh {flesh:.3f} r1, at least {MIN_FLESH}): make the stone radii "
-                f"rs1 = {s1:g}, rs2 = {s2:g} smaller, or the fruit radii larger"
+                f"the stone {where} (thinnest flesh {towards_zero(flesh)} r1, at least {MIN_FLESH}): make the stone "
+                f"radii rs1 = {s1:g}, rs2 = {s2:g} smaller, or the fruit radii larger"
             )
         return self
 

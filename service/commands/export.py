@@ -138,7 +138,8 @@ def export(asked: _Asked) -> None:
         _warn(bound)
 
     def show(console: Any) -> None:
-        console.print(f"{len(data) / 1e6:.3g} MB, {_counted(len(sequence))}, lengths in {sequence.length}", markup=False)
+        stages = _counted(len(sequence))
+        console.print(f"{len(data) / 1e6:.3g} MB, {stages}, lengths in {sequence.length}", markup=False)
         for name, value in document.get("mesh", {}).items():
             console.print(f"{name} {value:.3g}", markup=False)
         console.print(f"written to {out}", markup=False)

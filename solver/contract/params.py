@@ -22,6 +22,8 @@ class Params(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, validate_default=True)
 
     axes: ClassVar[Mapping[str, tuple[str, int | None]]] = {}
+    #: Names that a reader of the documents may try, and why there is no such parameter: what to do instead.
+    no_axes: ClassVar[Mapping[str, str]] = {}
 
     seed: int = Field(
         0,
@@ -41,6 +43,8 @@ class Params(BaseModel):
 
         """
         values = named(values)
+        for name in cls.no_axes.keys() & values.keys():
+            raise InvalidInput(f"{name!r} cannot be set.", advice=cls.no_axes[name])
         plain = {k: v for k, v in values.items() if k not in cls.axes}
         known = {**cls.model_fields, **dict.fromkeys(cls.axes)}
         try:

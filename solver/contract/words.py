@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import json
 import reprlib
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -53,7 +54,7 @@ def say(error: ValidationError, fields: Mapping[str, Any], typed: Mapping[Place,
             parts.append(f"unknown name {SHORT.repr(where)}{hint}")
         else:
             # who puts findings into a sentence ends it
-            message = _kind(item) or item["msg"].removeprefix("Value error, ").removesuffix(".")
+            message = _kind(item) or _form(item, fields) or item["msg"].removeprefix("Value error, ").removesuffix(".")
             got = item.get("input")
             shown = f" (got {SHORT.repr(got)})" if where and not isinstance(got, dict) else ""
             parts.append(f"{where + ': ' if where else ''}{message}{shown}")
@@ -93,6 +94,21 @@ def _kind(item: Mapping[str, Any]) -> str:
     near = difflib.get_close_matches(context["tag"], known, n=1)
     hint = f"did you mean {near[0]!r}? " if near else ""
     return f"there is no {name} {SHORT.repr(context['tag'])}; {hint}known: {', '.join(known)}"
+
+
+def _form(item: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
+    """Say what a field is, with an example, where what was given has another form; "" where that is not what is."""
+    place, kind = item["loc"], item["type"]
+    field = fields.get(str(place[0])) if place else None
+    annotation, default = getattr(field, "annotation", None), getattr(field, "default", None)
+    several = len(place) == 2 and kind == "missing" and isinstance(place[1], int)
+    if isinstance(default, tuple) and default and (several or (len(place) == 1 and kind in ("tuple_type", "too_long"))):
+        return f"{place[0]} needs {len(default)} values, such as {json.dumps(default)}"
+    if len(place) == 1 and kind == "model_type" and len(models := _models(annotation)) == 1:
+        needed = [name for name, inner in models[0].model_fields.items() if inner.is_required()]
+        more = [name for name in models[0].model_fields if name not in needed]
+        return f"it needs an object with {', '.join(needed)}{' and, if wanted, ' * bool(more)}{', '.join(more)}"
+    return ""
 
 
 def _called(place: Place, typed: Mapping[Place, str]) -> str:

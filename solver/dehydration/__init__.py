@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ..contract import Context, Cost, Need, Quality, Solver, StageAxis
 from ..fresh import SURFACE
 from ..fruit import PRESETS, SIZES
-from .drying import CLOCK
+from .drying import CLOCK, LATEST
 from .looks import LOOKS
 from .params import DehydrationParams
 
@@ -102,7 +102,7 @@ SOLVER = Solver(
         "shrinkage s = 1 - theta of the sarcocarp (negative: swelling)",
         "1",
         -0.3,
-        0.6,
+        LATEST,
         (0.1, 0.15, 0.2, 0.25, 0.3),
     ),
     default_resolution={"preview": 64, "default": 96, "fine": 128},

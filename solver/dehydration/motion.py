@@ -287,7 +287,7 @@ class Motion:
         if out_of_reach(state):
             raise Unstable(
                 f"the run blew up at shrinkage s = {shrinkage:.3f}.",
-                advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
+                advice="Ask for stages below that, or for a finer quality.",
             )
 
     def _ready(self, shrinkage: float, rest: Floats) -> Layout:

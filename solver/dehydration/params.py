@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from ..arrays import Floats
 from ..fruit import Fruit
 from ..painted import Painted, PaintedMap, painted
+from ..rounding import towards_zero
 
 __all__ = ["DehydrationParams", "LightMap", "Pattern"]
 
@@ -96,8 +97,9 @@ class DehydrationParams(Fruit):
         (0.0, 0.0, 0.0),
         # keys of runs that knew no light stay what they were
         exclude_if=lambda value: not any(value),
-        description="Light l from the direction it points to: the flesh below the skin at angle a to it is lit by "
-        "1 + |l| cos a, by 1 in its shade, and theta there is inversely proportional to it; at most 4 long",
+        description="Light l from the direction it points to: flesh whose ray from the centre is at angle a to it "
+        "is lit by 1 + |l| cos a, by 1 where a is past 90 degrees, whichever way the skin above faces, and theta there "
+        "is inversely proportional to it; at most 4 long",
         json_schema_extra={"units": "1"},
     )
     light_map: LightMap | None = Field(
@@ -135,17 +137,20 @@ class DehydrationParams(Fruit):
         steep = float(np.linalg.norm(self.wetness))
         if steep > STEEPEST * (1 + 1e-9):
             raise ValueError(
-                f"wetness is {steep:.3g} long (at most {STEEPEST}): multiply wx, wy, wz by {STEEPEST / steep:.3g}"
+                f"wetness is {steep:.3g} long (at most {STEEPEST}): multiply wx, wy, wz by "
+                f"{towards_zero(STEEPEST / steep)}"
             )
         strength = float(np.linalg.norm(self.light))
         if strength > (BRIGHTEST - 1) * (1 + 1e-9):
             most = BRIGHTEST - 1
-            raise ValueError(f"light is {strength:.3g} long (at most {most:g}): multiply it by {most / strength:.3g}")
+            raise ValueError(
+                f"light is {strength:.3g} long (at most {most:g}): multiply it by {towards_zero(most / strength)}"
+            )
         wettest, _ = self.local_share
         if wettest < 0:
             raise ValueError(
                 f"the flesh would swell where it is wettest (local shrinkage {wettest:.3g} s): "
-                f"multiply wx, wy, wz by {1 / (1 - wettest):.2g}"
+                f"multiply wx, wy, wz by {towards_zero((1 - 1e-9) / (1 - wettest))}"
             )
         return self
 
@@ -175,7 +180,10 @@ class DehydrationParams(Fruit):
         return self.is_sphere and self.dries_evenly
 
     def illumination(self, points: Floats) -> Floats:
-        """Return how brightly flesh at fresh points (n, 3) is lit, as the skin straight above it, shape (n,)."""
+        """Return how brightly flesh at fresh points (n, 3) is lit, shape (n,): by its ray from the centre.
+
+        All flesh along a ray is lit alike; the skin's normal, which is another way on long fruits, does not enter.
+        """
         rays = points / np.maximum(np.sqrt(np.einsum("ni,ni->n", points, points)), 1e-9)[:, None]
         found = np.ones(len(points))
         if self.light_map is not None:

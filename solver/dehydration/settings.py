@@ -163,9 +163,21 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
         raise InvalidInput(
             f"wrinkles of te = {params.exocarp_thickness:g} and gamma = {params.modulus_ratio:g} are {wavelength:.3g} "
             f"long and take {settings.elements:,} elements, more than {_MOST_ELEMENTS:,}.",
-            advice="Give the fruit mirrors (each halves the elements), or take a thicker or stiffer exocarp.",
+            advice=f"{_mirrored_more(params)}ake a thicker or stiffer exocarp.",
         )
     return settings
+
+
+def _mirrored_more(params: DehydrationParams) -> str:
+    """Return the beginning of an advice: the mirrors that the fruit can have and has not, and a T to go on with."""
+    mirrors = "" if params.light_map is not None else "xyz"
+    if params.radii[:7] != params.radii[6::-1]:
+        mirrors = mirrors.replace("y", "")
+    for own in (params.wetness, params.light):
+        mirrors = "".join(name for name in mirrors if not own["xyz".index(name)])
+    if set(mirrors) == set(params.mirrors):
+        return "T"
+    return f"Set mirrors to {mirrors} (each halves the elements), or t"
 
 
 def _is_easy(params: DehydrationParams) -> bool:

@@ -125,7 +125,7 @@ def settle(
     if least <= 0:
         raise Unstable(
             f"elements turned inside out at shrinkage s = {shrinkage:.3f} (least J {least:.2f}).",
-            advice="Ask for stages below that, a finer quality, or a thicker exocarp.",
+            advice="Ask for stages below that, or for a finer quality.",
             residual=residual,
         )
     released = None

@@ -114,11 +114,26 @@ def test_presets_dry_as_their_fruit() -> None:
         ("raisin", 10, {"wind": 3}, "unknown name 'wind'"),
         ("raisin", float("inf"), {}, "outside of what was measured"),
         ("sphere", 10, {"kinetics": "page", "rate": float("nan"), "moisture": 0.8}, "rate"),
+        ("sphere", 1e300, {"kinetics": "page", "rate": 0.05, "exponent": 3, "moisture": 0.8}, "no time that a fruit"),
+        ("sphere", -1, {"kinetics": "page", "rate": 0.05, "moisture": 0.8}, "no time that a fruit"),
+        ("jujube1", float("inf"), {"temperature": 60, "air_speed": 1, "diameter": 22}, "no time that a fruit"),
+        ("jujube1", 24, {"temperature": 60, "air_speed": 1, "diameter": 1e-300}, "diameter: .* equal to 1"),
+        ("jujube1", 24, {"temperature": 60, "air_speed": 1, "diameter": 1e300}, "diameter: .* equal to 1000"),
     ],
 )
 def test_what_nobody_measured_is_refused(preset: str, hours: float, under: dict[str, object], word: str) -> None:
     with pytest.raises(InvalidInput, match=word):
         SOLVER.stages_after([hours], under, preset)
+
+
+@pytest.mark.parametrize("exponent", [0.3, 1.0, 3.0])
+def test_hours_past_the_last_stage_are_refused_in_hours(exponent: float) -> None:
+    under = {"kinetics": "page", "rate": 0.2, "exponent": exponent, "moisture": 0.95}
+    with pytest.raises(InvalidInput, match=r"after 1e\+06 h .* s = 0\.6828, and stages end at 0\.6") as refused:
+        SOLVER.stages_after([1e6], under)
+    most = float(refused.value.advice.removeprefix("Ask for at most ").removesuffix(" hours."))
+    assert SOLVER.stages_after([most], under)[0] == pytest.approx(0.6, abs=1e-3)
+    assert SOLVER.stages_after([most], under)[0] <= SOLVER.stages.highest
 
 
 def test_solvers_without_a_clock_say_so() -> None:

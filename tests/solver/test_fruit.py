@@ -83,8 +83,11 @@ def test_lattice_avoids_the_poles_and_closes_in_azimuth():
         ({"te": "thick"}, InvalidInput, "exocarp_thickness"),
         ({"tee": 0.04}, InvalidInput, "did you mean 'te'"),
         ({"radii": [2.0] + [1.0] * 7}, InvalidInput, "divide every length by r1"),
-        ({"radii": [1.0] * 7}, InvalidInput, "radii"),
-        ({"stone": 0.4}, InvalidInput, "stone"),
+        ({"radii": [1.0] * 7}, InvalidInput, r"radii needs 8 values, such as \[1.0, 1.0, "),
+        ({"radii": [1.0] * 9}, InvalidInput, "radii needs 8 values"),
+        ({"stone": 0.4}, InvalidInput, r"stone: stone needs 2 values, such as \[0.4, 0.4\] \(got 0.4"),
+        ({"r1": 2.0}, InvalidInput, "'r1' cannot be set. It is the unit of length"),
+        ({"stone": (0.9803, 0.9803)}, InvalidGeometry, "thinnest flesh 0.0196 r1, at least 0.02"),
         ({"seed": -1}, InvalidInput, "seed"),
     ],
 )
@@ -99,3 +102,8 @@ def test_scalar_axes_override_single_entries_of_a_preset():
     assert f.stone == (0.4, 0.25)
     assert f.axis("r4") == 0.9
     assert f.axis("te") == 0.02
+
+
+def test_a_stone_may_leave_exactly_the_least_flesh():
+    """1 - 0.98 is 0.02 less a rounding."""
+    assert fruit("sphere", stone=(0.98, 0.98)).stone == (0.98, 0.98)

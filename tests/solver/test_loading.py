@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -98,11 +99,30 @@ def test_flesh_without_a_stone_starts_at_fd_x():
         ({"light_map": [[0, 1]], "mirrors": "x"}, InvalidGeometry, "leave out mirrors"),
         ({"light_map": [[0, 1, 1]]}, InvalidInput, "has 2 values"),
         ({"imperfection_kind": "noise"}, InvalidInput, "imperfection_kind"),
+        ({"pattern": "abc"}, InvalidInput, "an object with key, stage and, if wanted, amplitude"),
     ],
 )
 def test_refusals_of_the_loading(values, kind, words):
     with pytest.raises(kind, match=words):
         parse(**values)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "changes"),
+    [
+        ("light", (3.0, 3.0, 0.0), {}),
+        ("light", (4.0, 4.0, 4.0), {}),
+        ("wetness", (0.6, 0.6, 0.0), {}),
+        ("wetness", (0.8, 0.0, 0.0), {"radii": (1, 1.2, 1.4, 1.4, 1.4, 1.2, 1, 1.4)}),
+        ("wetness", (0.72, 0.0, 0.0), {"radii": (1, 1.2, 1.5, 1.5, 1.5, 1.2, 1, 1.5)}),
+    ],
+)
+def test_what_a_refusal_says_to_multiply_by_is_enough(field, value, changes):
+    with pytest.raises(InvalidGeometry, match="multiply") as refused:
+        parse(**changes, **{field: value})
+    factor = float(re.search(r"by ([\d.]*\d)", str(refused.value))[1])
+    assert parse(**changes, **{field: tuple(each * factor for each in value)})
+    assert factor > 0.9 * {"light": 4, "wetness": 0.8}[field] / np.linalg.norm(value) / (1.2 if changes else 1)
 
 
 def test_flesh_must_not_swell_where_it_is_wettest():
@@ -113,11 +133,11 @@ def test_flesh_must_not_swell_where_it_is_wettest():
 @pytest.mark.parametrize(
     ("values", "stage", "words"),
     [
-        ({"wetness": (0.8, 0, 0)}, 0.55, "Ask for stages below 0.52"),
+        ({"wetness": (0.8, 0, 0)}, 0.55, "Ask for stages below 0.527"),
         ({"anisotropy": (1, 2, 1)}, 0.5, "below 0.475"),
         ({"anisotropy": (1, 2, 1), "wetness": (0, 0.8, 0)}, -0.3, None),
         ({"r8": 2.0, "anisotropy": (2, 2, 2), "wz": 0.3}, -0.3, "stages above"),
-        ({"light": (0, 4, 0)}, 0.9, "stages below 0.792"),
+        ({"light": (0, 4, 0)}, 0.9, "stages below 0.791"),
         ({"light": (0, 1, 0)}, -0.1, "light dries"),
     ],
 )
@@ -127,8 +147,10 @@ def test_stages_that_the_loading_cannot_reach_are_refused(values, stage, words):
     if words is None:
         loading.check(stage)
     else:
-        with pytest.raises(InvalidInput, match=words):
+        with pytest.raises(InvalidInput, match=words) as refused:
             loading.check(stage)
+        if bound := re.search(r"stages (?:below|above) (-?[\d.]*\d)", refused.value.advice):
+            loading.check(float(bound[1]) * (1 - 1e-6))
 
 
 # ------------------------------------------------------------------------------------------------- small relaxations

@@ -46,6 +46,25 @@ def test_a_stage_that_is_still_smooth_needs_no_waves():
     assert "mirrors" in refused.value.advice
 
 
+@pytest.mark.parametrize(
+    ("changes", "mirrors"),
+    [
+        ({}, "xyz"),
+        ({"mirrors": "xz"}, "xyz"),
+        ({"mirrors": "xyz"}, None),
+        ({"light": (0.0, 0.0, 1.0)}, "xy"),
+        ({"wx": 0.1, "mirrors": "yz"}, None),
+        ({"r2": 0.99}, "xz"),
+        ({"light_map": [[0.5, 0.6]]}, None),
+    ],
+)
+def test_a_refusal_for_elements_names_the_mirrors_that_are_left(changes, mirrors):
+    with pytest.raises(InvalidInput, match="elements") as refused:
+        choose(SOLVER.parse({"te": 0.002, "gamma": 1.0, **changes}), "preview", 0.3)
+    begin = f"Set mirrors to {mirrors} (each halves the elements), or take" if mirrors else "Take"
+    assert refused.value.advice == f"{begin} a thicker or stiffer exocarp."
+
+
 @pytest.mark.parametrize(("quality", "width"), [("preview", 2.1), ("default", 1.46), ("fine", 1.0)])
 def test_elements_of_the_skin_are_as_wide_as_it_is_thick_at_fine(quality, width):
     """Liu et al. 2014 mesh with elements of the exocarp of about te, that grow inwards: at gamma = 10 fine does."""

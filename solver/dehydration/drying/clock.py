@@ -6,10 +6,14 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from ...contract import Clock, InvalidInput
+from ...rounding import towards_zero
 from . import moisture
 from .conditions import Drying
 
-__all__ = ["CLOCK", "shrinkage"]
+__all__ = ["CLOCK", "LATEST", "shrinkage"]
+
+#: Shrinkage up to which there are stages.
+LATEST = 0.6
 
 #: Densities at 25 C [kg/m3] of water and of carbohydrate, which most of the dry matter is (Choi and Okos 1986).
 _WATER, _SOLIDS = 997.0, 1591.3
@@ -56,7 +60,26 @@ def _stage(hours: float, under: Drying, preset: str | None) -> float:
         raise InvalidInput(
             f"kinetics={name} wants the moisture of the fresh flesh.", advice="For example moisture=0.8 (of its mass)."
         )
+    stage = _after(law, hours, under, water)
+    if stage > LATEST:
+        raise InvalidInput(
+            f"after {hours:g} h the flesh would have shrunk by s = {stage:.4g}, and stages end at {LATEST:g}.",
+            advice=f"Ask for at most {towards_zero(_longest(law, hours, under, water), 4)} hours.",
+        )
+    return stage
+
+
+def _after(law: _Measured, hours: float, under: Drying, water: float) -> float:
     return round(shrinkage(law.left(hours, under), water), 6)
+
+
+def _longest(law: _Measured, hours: float, under: Drying, water: float) -> float:
+    """Return until when there are stages, of a fruit that is past the last one after `hours`."""
+    early, late = 0.0, hours
+    for _ in range(100):
+        middle = (early + late) / 2
+        early, late = (early, middle) if _after(law, middle, under, water) > LATEST else (middle, late)
+    return early
 
 
 CLOCK = Clock(conditions=Drying, stage=_stage)

@@ -31,7 +31,7 @@ class Drying(BaseModel):
     air_speed: Annotated[float, Field(ge=0)] | None = Field(
         None, description="Speed of the air past the fruits", json_schema_extra=_units("m s-1")
     )
-    diameter: Annotated[float, Field(gt=0)] | None = Field(
+    diameter: Annotated[float, Field(ge=1, le=1000)] | None = Field(
         None, description="Diameter of the fresh fruit as a sphere", json_schema_extra=_units("mm")
     )
     moisture: Annotated[float, Field(ge=0.5, le=0.95)] | None = Field(

@@ -21,6 +21,7 @@ from __future__ import annotations
 import math
 
 from ...contract import InvalidInput
+from ...rounding import towards_zero
 from .conditions import Drying
 
 __all__ = ["grape", "jujube", "page", "sphere"]
@@ -33,6 +34,8 @@ _SLOWEST, _FASTEST = (50.0, 0.5, 1.1532e-10), (70.0, 1.5, 5.1895e-10)
 _ENERGY = (34.97 + 74.20) / 2 * 1e3
 _GAS = 8.314462618
 _ZERO = 273.15
+#: No fruit dries for longer [h]: 114 years.
+_LONGEST = 1e6
 
 
 def grape(hours: float, under: Drying) -> float:
@@ -62,7 +65,8 @@ def jujube(hours: float, under: Drying) -> float:
     """Return MR of whole jujubes in hot air.
 
     Raises:
-        InvalidInput: temperature, air or diameter missing; air that nobody measured; a humidity, which nobody varied.
+        InvalidInput: temperature, air or diameter missing; air that nobody measured; a humidity, which nobody varied;
+            hours that no fruit dries for.
 
     """
     if under.humidity is not None:
@@ -76,7 +80,7 @@ def jujube(hours: float, under: Drying) -> float:
     (cold, slow, least), (hot, fast, largest) = _SLOWEST, _FASTEST
     _within("temperature", under.temperature, cold, hot, "C")
     _within("air_speed", under.air_speed, slow, fast, "m/s")
-    _within("hours", hours, 0.0, math.inf, "h")
+    _bearable(hours)
 
     def warmth(temperature: float) -> float:
         return _ENERGY / _GAS * (1 / (_ZERO + cold) - 1 / (_ZERO + temperature))
@@ -90,12 +94,12 @@ def page(hours: float, under: Drying) -> float:
     """Return MR by Page's law with the asker's own rate and exponent (G. E. Page, Purdue University, 1949).
 
     Raises:
-        InvalidInput: no rate.
+        InvalidInput: no rate, or hours that no fruit dries for.
 
     """
     if under.rate is None:
         raise InvalidInput("kinetics=page wants a rate k.", advice="For example rate=0.05, exponent=1 (per hour).")
-    _within("hours", hours, 0.0, math.inf, "h")
+    _bearable(hours)
     return math.exp(-under.rate * hours**under.exponent)
 
 
@@ -116,10 +120,17 @@ def _ratio(wet: float) -> float:
     return wet / (1 - wet)
 
 
+def _bearable(hours: float) -> None:
+    if not 0 <= hours <= _LONGEST:
+        raise InvalidInput(
+            f"hours = {hours:g} h is no time that a fruit dries for: 0 to {_LONGEST:.0f} h.",
+            advice="Take hours from there.",
+        )
+
+
 def _within(name: str, value: float, low: float, high: float, units: str) -> None:
     if not low <= value <= high:
-        until = "" if math.isinf(high) else f" to {high:.4g}"
         raise InvalidInput(
-            f"{name} = {value:g} {units} is outside of what was measured: {low:g}{until} {units}.",
+            f"{name} = {value:g} {units} is outside of what was measured: {low:g} to {towards_zero(high, 4)} {units}.",
             advice=f"Take {name} from there, or set kinetics=page with rate and exponent of your own measurements.",
         )

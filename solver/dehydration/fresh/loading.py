@@ -17,6 +17,7 @@ from ...arrays import Floats
 from ...contract import InvalidInput
 from ...fruit import lattice
 from ...lattice import directions
+from ...rounding import towards_zero
 from ..params import DehydrationParams
 
 __all__ = ["Loading"]
@@ -90,15 +91,15 @@ class Loading:
             most = (1 - LEAST) / (factor * self._share[1])
             raise InvalidInput(
                 f"at s = {shrinkage:g} the driest flesh would have shrunk by {1 - low:.2f} (at most {1 - LEAST:.2f}).",
-                advice=f"Ask for stages below {most / (bright - most * bright + most):.3g}, or for less wetness, "
-                "anisotropy or light.",
+                advice=f"Ask for stages below {towards_zero(most / (bright - most * bright + most))}, or for less "
+                "wetness, anisotropy or light.",
             )
         most = min(MOST, FARTHEST / self._size)
         if high > most:
             raise InvalidInput(
                 f"at s = {shrinkage:g} the flesh would have swollen to {high:.2f} times its size (at most {most:.2f}).",
-                advice=f"Ask for stages above {(1 - most) / (factor * self._share[1]):.3g}, or for less wetness "
-                "or anisotropy.",
+                advice=f"Ask for stages above {towards_zero((1 - most) / (factor * self._share[1]))}, or for less "
+                "wetness or anisotropy.",
             )
 
 
