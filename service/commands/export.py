@@ -138,8 +138,7 @@ def export(asked: _Asked) -> None:
         _warn(bound)
 
     def show(console: Any) -> None:
-        stages = _counted(len(sequence))
-        console.print(f"{len(data) / 1e6:.3g} MB, {stages}, lengths in {sequence.length}", markup=False)
+        console.print(f"{_size(len(data), len(sequence))}, lengths in {sequence.length}", markup=False)
         for name, value in document.get("mesh", {}).items():
             console.print(f"{name} {value:.3g}", markup=False)
         console.print(f"written to {out}", markup=False)
@@ -211,6 +210,10 @@ def _shown(run: xr.Dataset) -> xr.Dataset:
 
 def _counted(stages: int) -> str:
     return f"{stages} stage{'' if stages == 1 else 's'}"
+
+
+def _size(count: int, stages: int) -> str:
+    return f"{count / 1e6:.3g} MB, {_counted(stages)}"
 
 
 def _warn_of_threads(run: xr.Dataset, threads: int | None) -> None:
