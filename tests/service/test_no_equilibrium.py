@@ -9,6 +9,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+import xarray as xr
 from typer.testing import CliRunner
 
 from service.cli import app
@@ -42,16 +43,27 @@ def told(problem: dict[str, Any], said: str) -> None:
     assert problem["last_stage"] == 0.2
 
 
+def lying_flat(path: Path) -> xr.Dataset:
+    """Return the stages that were kept: those before it fell."""
+    kept = shards.read(path)
+    assert kept["stage"].values.tolist() == [0.1, 0.2]
+    assert kept["converged"].values.all()
+    last = frame(kept, -1).vertices
+    assert np.abs(last[:, 2] - TABLE).max() < 0.01
+    return kept
+
+
 @pytest.mark.parametrize("as_json", [True, False])
-def test_the_command_line_says_what_to_change_and_fails(as_json: bool, tmp_path: Path) -> None:
+def test_the_command_line_says_what_to_change_and_keeps_its_good_stages(as_json: bool, tmp_path: Path) -> None:
     (tmp_path / "falling.json").write_text(json.dumps(FALLING))
     out = tmp_path / "falling.h5"
     words = ["solve", "growth", "--params", str(tmp_path / "falling.json"), "--quality", "preview", "--out", str(out)]
     found = CliRunner().invoke(app, [*words, "--stages", "0.1,0.2,0.4", *(["--json"] if as_json else [])])
     # 2 is for what could have been known before any work
     assert found.exit_code == 1
-    assert not out.exists()
     assert "Traceback" not in found.output
+    lying_flat(out)
+    assert f"0.1, 0.2 settled before, and {out} holds them" in found.stderr
     if as_json:
         error = json.loads(found.stdout)["error"]
         assert error["code"] == "not-converged"
@@ -72,9 +84,5 @@ def test_a_job_over_http_says_it_and_keeps_its_good_stages(store: Store, queue_o
     told(failed["problem"], "detail")
     problem = checked(queue_only.get(f"{job['links']['self']}/result"), 409, "job-failed")
     assert "falls" in problem["detail"]
-    kept = shards.read(store.root / "quarantine" / f"{job['id']}.h5")
-    assert kept["stage"].values.tolist() == [0.1, 0.2]
-    assert kept["converged"].values.all()
+    kept = lying_flat(store.root / "quarantine" / f"{job['id']}.h5")
     assert "falls" in kept.attrs["reason"]
-    last = frame(kept, -1).vertices
-    assert np.abs(last[:, 2] - TABLE).max() < 0.01, "it lay flat"
