@@ -205,7 +205,7 @@ class ShapeTable:
         mixed = self._blender.mix(point, near, tuple(_stored(stages)), how)
         inside = self._samples is None or point is None or near.nearest == 0 or self._samples.contains(point)
         expected = self._expect(near, stages, how)
-        trust.refuse(expected, max_error, inside, self._judged, self._knows(how) and len(stages) > 1)
+        trust.refuse(expected, max_error, inside, self._judged, self._beside(stages) if self._knows(how) else ())
         exact = s == 0 or (near.nearest == 0.0 and len(stages) == 1)
         found, crossings = self._fields(fields, patch, values, self._blend(point, mixed, stages, how, n), exact, apart)
         return Shape(
@@ -317,6 +317,11 @@ class ShapeTable:
         if self._trust is None or not self._knows(method):
             return None
         return self._trust.expect(near, stages)
+
+    def _beside(self, stages: Mapping[int, float]) -> list[float]:
+        """Return the stages on both sides of one between two; none of a stored one."""
+        stored = dict(zip(self._stored, self._knots, strict=True))
+        return sorted(stored[j] for j in stages) if len(stages) > 1 else []
 
     def _knows(self, method: methods.Method) -> bool:
         """Return whether the table knows errors of that method."""

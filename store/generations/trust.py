@@ -202,12 +202,12 @@ def refuse(
     limit: float | Mapping[str, float] | None,
     inside: bool,
     known: str | None,
-    between: bool = False,
+    between: Sequence[float] = (),
 ) -> None:
     """Refuse an answer that is worse than asked for; a number limits the error of the roughness, None nothing.
 
-    `known` is the method whose errors the table holds, if it holds any; `between`: what it does not know are those
-    between two stages.
+    `known` is the method whose errors the table holds, if it holds any; `between` the stages on both sides of the one
+    that is asked for, where the table holds errors of the method but none of this very stage.
 
     Raises:
         TooUncertain: an expected error is above its limit, or nobody knows it.
@@ -234,8 +234,9 @@ def refuse(
                 f"Take the method {known}, or ask without max_error.",
             )
         if expected[name] > most:
+            there = f"ask for a stage of the table ({' or '.join(f'{s:g}' for s in between)}), " if between else ""
             where = "" if inside else " The query lies outside the hull of the samples."
             raise TooUncertain(
                 f"the expected error {name} is {expected[name]:.3g}, above {most:g}.{where}",
-                "Run exactly these parameters, add samples near them, or allow a larger error.",
+                f"Run exactly these parameters, {there}add samples near them, or allow a larger error.",
             )

@@ -199,8 +199,9 @@ def test_between_two_stages_an_error_is_expected_as_well(tmp_path: Path) -> None
     # half-way from one stage to the next it errs, and by no more than is said
     assert all(0 < error <= said for half in halves for error, said in half.values())
     assert all(half["L2nr"][0] > 0.05 for half in halves)
-    with pytest.raises(TooUncertain, match="expected error"):
+    with pytest.raises(TooUncertain, match="expected error") as refused:
         table.at(query, 0.15, max_error={"L2nr": 0.01})
+    assert "ask for a stage of the table (0.1 or 0.2), " in refused.value.advice
     # no jump at a stage: the nearer, the less
     for stage in (0.15, 0.175, 0.19, 0.1999, 0.2):
         expected = table.at(query, stage, fields=()).expected_error
@@ -222,7 +223,7 @@ def test_a_table_that_knows_nothing_between_its_stages_says_so(rough: ShapeTable
     assert trusted.expect(near, {1: 1.0}) is not None
     assert trusted.expect(near, {0: 0.5, 1: 0.5}) is None
     with pytest.raises(TooUncertain, match="between two stages") as refused:
-        trust.refuse(None, 0.1, True, methods.DEFAULT, True)
+        trust.refuse(None, 0.1, True, methods.DEFAULT, (0.1, 0.2))
     assert "rebuild" in refused.value.advice
 
 
