@@ -17,14 +17,17 @@ from .fresh.pattern import pattern_heights
 from .fresh.sector import cut, evened, mirrored
 from .kernel import (
     Layout,
+    Weights,
     build_layout,
     dilatations,
     element_report,
     forget,
+    held_outside,
     internal_force,
     least_ratios,
     make_skin,
     march,
+    momentum,
     new_state,
     out_of_reach,
     positions,
@@ -37,10 +40,9 @@ from .kernel import (
     without_bulk,
 )
 from .kernel.fixed_point import QUANTUM
-from .kernel.layout import aligned_copy
 from .kernel.march import SEARCH_EVERY
 from .params import DehydrationParams
-from .settings import Settings
+from .settings import MARCH_KAPPA, Settings
 
 __all__ = ["Motion"]
 
@@ -67,8 +69,9 @@ _CLOSE = 0.1
 #: How fast rest volumes follow the pressure, as a share of what damping takes from a ringing volume.
 _FOLLOW = 0.125
 
-#: Strain below which forces count as round-off.
-_LEAST_STRAIN = 1e-4
+#: Strain below which no forces are compared with; and strain whose forces are round-off, as positions are of whole
+#: quanta and forces float32: fruits of te 0.01 to 0.1 at rest are out of balance by 0.5 to 1.6e-5.
+_LEAST_STRAIN, _ROUND_OFF = 1e-4, 2e-5
 
 
 class Motion:
@@ -94,7 +97,9 @@ class Motion:
         fade = (bumps[:, None] * mesh.depth[None, :] ** 2).reshape(-1, 1)
         bumpy = mesh.positions + fade * np.repeat(mesh.rays, mesh.levels, axis=0)
         mu = np.where(mesh.is_exocarp, params.modulus_ratio, 1.0)
-        self._moduli = mu, settings.march_kappa_ratio * mu
+        # by element: the skin is stiff enough as it is
+        self._march_kappa_ratio = np.where(mesh.is_exocarp, MARCH_KAPPA, settings.march_kappa_ratio)
+        self._moduli = mu, self._march_kappa_ratio * mu
         self.rest = np.ones(len(mu))
         self._made: tuple[Floats, Layout] | None = None
         self.layout = build_layout(
@@ -106,12 +111,13 @@ class Motion:
             safety=_SAFETY,
             full_levels=settings.full_levels,
             mirrored=self.sector.planes,
+            tops=mesh.surface_nodes,
         )
         self.drive = Drive(params, mesh, self.layout)
         self._fresh_bound = stiffness_bounds(
             self.layout, self.layout.fresh, mesh.is_exocarp, *self._moduli, even_crushed=True
         )
-        self._least_force = _LEAST_STRAIN * _unit_force(self.layout, mu)
+        self._unit_force = _unit_force(self.layout, mu)
         te = params.exocarp_thickness
         sector = self.sector
         self._skin = make_skin(
@@ -195,9 +201,7 @@ class Motion:
         self.drive.lead(state, shrinkage)
         self._follow(state, velocity)
         ready = self._ready(shrinkage, rest)
-        inverse = aligned_copy(ready.inverse_mass, np.float32)
-        inverse[self.sector.mesh.surface_nodes] = 0
-        held = dataclasses.replace(ready, inverse_mass=inverse)
+        held = held_outside(ready, self.sector.mesh.surface_nodes)
         theta = 1 - shrinkage
         march(held, state, velocity, count, theta=(theta, theta), damping=damping, one_point=True)
         self._arrive(state, count, shrinkage)
@@ -214,10 +218,8 @@ class Motion:
     def rests(self, state: Fixed, rest: Floats, shrinkage: float) -> Floats:
         """Return the rest volumes (ne,) that go with the pressures that a state has under `rest`."""
         settings = self.settings
-        if settings.kappa_ratio == settings.march_kappa_ratio:
-            return rest
         strain = dilatations(self._ready(shrinkage, rest), state, 1 - shrinkage)
-        return rests(strain, settings.march_kappa_ratio, settings.kappa_ratio)
+        return rests(strain, self._march_kappa_ratio, settings.kappa_ratio)
 
     def run(
         self,
@@ -297,7 +299,8 @@ class Motion:
             before = self._made[1] if self._made is not None and uniform else None
             self._made = rest, rested(self.drive.loaded(self.layout, shrinkage), rest, before)
         planes = self._made[1]
-        return dataclasses.replace(planes, mass=self.layout.mass, inverse_mass=self.layout.inverse_mass)
+        own = {name: getattr(self.layout, name) for name in Weights._fields}
+        return dataclasses.replace(planes, **own)
 
     def marched_energy(self, state: Fixed, rest: Floats, shrinkage: float) -> float:
         """Return the energy of the part [mu r1^3] that steps lower, but for a constant of the rest volumes."""
@@ -316,7 +319,7 @@ class Motion:
             return None, float(least_ratios(loaded, state, theta).min())
         sheared = element_report(without_bulk(loaded), state, theta, one_point=True)
         dilatation = dilatations(self._ready(shrinkage, rest), state, theta)
-        share = settings.march_kappa_ratio / settings.kappa_ratio
+        share = self._march_kappa_ratio / settings.kappa_ratio
         energy = float((sheared.energy + pressure_energy(loaded, dilatation, theta, share)).sum())
         return self.sector.copies * energy, float(sheared.least_ratio.min())
 
@@ -332,10 +335,12 @@ class Motion:
         moved, kick = state.copy(), np.zeros((layout.nodes, 4), np.float32)
         weigh(self._skin, layout)  # pairs are still those of the steps before, or are looked for anew
         march(layout, moved, kick, 1, theta=(theta, theta), damping=damping, one_point=True, skin=self._skin)
-        momentum = (1 + damping / 2) * (kick[:, :3] * layout.mass[:, None])[layout.free]
-        # a fruit without stress has nothing but round-off; that is no lack of balance
+        pushed = (1 + damping / 2) * momentum(layout, kick)[layout.free]
         # not `norm`: it is a BLAS dot product, whose rounding depends on the number of threads
-        return float(np.sqrt(np.square(momentum).sum())) / max(scale, self._least_force)
+        force = float(np.sqrt(np.square(pushed).sum()))
+        # a fruit with next to no stress has nothing but round-off; that is no lack of balance
+        beyond = max(force - _ROUND_OFF * self._unit_force, 0.0)
+        return beyond / max(scale, _LEAST_STRAIN * self._unit_force)
 
 
 def _unit_force(layout: Layout, mu: Floats) -> float:

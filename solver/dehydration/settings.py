@@ -15,7 +15,7 @@ from .fresh.loading import Loading
 from .fresh.mesh import flesh_span, layer_fractions
 from .params import DehydrationParams
 
-__all__ = ["Settings", "choose", "expected_cost"]
+__all__ = ["MARCH_KAPPA", "Settings", "choose", "expected_cost"]
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,8 @@ class Settings:
 
     n: elements per edge of the cubed sphere. core: fractions of the core's layer breakpoints. full_levels: outermost
     core layers that are integrated fully, the others take one point.
-    kappa_ratio: bulk over shear modulus; march_kappa_ratio: the one that is marched with (see `kernel.bulk`).
+    kappa_ratio: bulk over shear modulus; march_kappa_ratio: the one of the flesh that is marched with (see
+    `kernel.bulk`; the skin's is `MARCH_KAPPA`).
     start: shrinkage below which the fruit is still smooth, where the march begins. pace: shrinkage per step of the
     march. copies: mirror images that make up the whole fruit. damping: per step, while marching; swing_damping and
     calm_damping: while a stage settles (see `settle.settle`). residual, drift: at which a stage counts as settled (see
@@ -90,19 +91,25 @@ _FEWEST_PER_WAVELENGTH = 4.0
 #: Elements of the largest run: 3 GB, and an hour or more to s = 0.3 on two cores.
 _MOST_ELEMENTS = 2_500_000
 
-#: Steps from s = 0 to 0.3 at n = 24: two and a half or four times as many change the roughness of
-#: settled stages by less than 2 %, as another seed does; five eighths of them raise it by 3 % at s = 0.3. More elements
-#: shorten the critical step, so their product with the step must be kept.
-_STEPS, _STEPS_N, _STEPS_SPAN = 6400.0, 24, 0.3
+#: Steps from s = 0 to 0.3 at n = 24: three times as many lead to states of the same energy. More elements shorten the
+#: critical step, so their product with the step must be kept.
+_STEPS, _STEPS_N, _STEPS_SPAN = 2000.0, 24, 0.3
 #: Damping per step at the same reference: low enough not to delay the onset; and while a stage settles. The slowest
 #: modes keep their shape on every mesh, so per step they slow down as the step shrinks, and damping with them.
 _DAMPING, _SWING_DAMPING = 0.004, 0.0005
+#: Edge over thickness of the skin's elements from which its waves are the faster for it, as its columns share their
+#: masses (see `kernel.coupled`; 1.5 to 2.1 times at te = 0.02 and 0.04), and by how much at most. Swings of full length
+#: took such skins past where they were going: te = 0.02 at default took 53,000 steps in place of 4,000 to s = 0.2.
+_SLENDER, _FASTEST = 1.5, 2.0
 #: Longest turns of swinging (at the same reference) and calming, and most steps that a stage may settle for.
 _SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 750, 400, 40_000
 #: Bulk over shear modulus that all qualities stand for, off by 1e-4 from incompressible in radius; and that steps are
 #: taken with. By 15 they are 1.4 times as long, but what balances at 1000 may be unstable at 15 while rest volumes
 #: stay: te = 0.02, gamma = 10 at default took four times the steps and did not settle (record dehydration-settling).
-_KAPPA, _MARCH_KAPPA = 1000.0, 30.0
+_KAPPA, MARCH_KAPPA = 1000.0, 30.0
+#: Bulk modulus of flesh that is marched with over that of its skin, 4 gamma te: softer flesh would take most of what
+#: the skin gives way by, and its rest volumes would follow for ever.
+_STIFFER = 2.0
 #: Thickness of the core layer at the interface, in wavelengths, and how fast layers grow inwards.
 _FIRST_LAYER, _GROWTH = 0.08, 1.3
 #: Wall seconds per element and step on one core, for estimates only.
@@ -117,7 +124,7 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
     """Return the settings of `quality` (preview, default, fine) for `params`, for stages up to `last`.
 
     The mesh resolves the expected wrinkle wavelength by a fixed number of elements, within the quality's bounds, but
-    never by fewer than four where wrinkles are to be expected.
+    never by fewer than four.
 
     Raises:
         InvalidInput: four elements a wavelength are more than a run may have.
@@ -132,40 +139,52 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
     loading = Loading(params)
     margin = 0.75 if params.stays_spherical else 0.5
     start = margin * onset_estimate(params.modulus_ratio, min(params.stone)) / loading.peak
-    least = math.ceil(np.pi / 2 * _FEWEST_PER_WAVELENGTH / wavelength) if last > start else 0
-    forced, n = n < least, max(n, least)
-    if params.mirrors:
-        n += n % 2  # a mirror plane is a line of nodes
     # where flesh is more than twice as thick as on average, layers are counted on it
     flesh = max(float(np.mean(params.radii[:7])) - max(params.stone), flesh_span(params)[1] / 2)
     core = layer_fractions(max(flesh, 0.05), _FIRST_LAYER * min(wavelength, 0.4), _GROWTH)
+    n = _wrinkled(params, n, len(core) + 1, wavelength, last > start)
     scale = n / _STEPS_N
-    settings = Settings(
+    slender = np.pi / 2 / n / (params.exocarp_thickness / 2)
+    faster = min(max(slender / _SLENDER, 1.0), _FASTEST)
+    stiffness = 4 * params.modulus_ratio * params.exocarp_thickness
+    return Settings(
         n=n,
         core=core,
         kappa_ratio=_KAPPA,
-        march_kappa_ratio=_MARCH_KAPPA,
+        march_kappa_ratio=min(max(MARCH_KAPPA, _STIFFER * stiffness), _KAPPA),
         pace=_STEPS_SPAN / (_STEPS * scale) / loading.peak,
         damping=_DAMPING / scale,
         swing_damping=_SWING_DAMPING / scale,
         calm_damping=0.06,
         residual=q.residual,
         drift=q.drift,
-        swing_steps=round(_SWING_STEPS * scale),
+        swing_steps=round(_SWING_STEPS * scale / faster),
         calm_steps=_CALM_STEPS,
-        settle_steps=round(_SETTLE_STEPS * scale),
+        settle_steps=round(_SETTLE_STEPS * scale / faster),
         start=start,
         rungs=_WIDE if quality != "fine" and _is_easy(params) else _RUNGS,
         full_levels=q.full_levels,
         copies=2 ** len(params.mirrors),
     )
-    if forced and settings.elements > _MOST_ELEMENTS:
+
+
+def _wrinkled(params: DehydrationParams, n: int, layers: int, wavelength: float, wrinkles: bool) -> int:
+    """Return how many elements an edge has, `n` or what wrinkles take; whether they are asked for changes nothing, but
+    that what stays smooth has `n` where wrinkles would be refused.
+    """
+    least = max(n, math.ceil(np.pi / 2 * _FEWEST_PER_WAVELENGTH / wavelength))
+    # a mirror plane is a line of nodes
+    few, many = ((count + count % 2) if params.mirrors else count for count in (n, least))
+    elements = 6 * many**2 * layers // 2 ** len(params.mirrors)
+    if many == few or elements <= _MOST_ELEMENTS:
+        return many
+    if wrinkles:
         raise InvalidInput(
             f"wrinkles of te = {params.exocarp_thickness:g} and gamma = {params.modulus_ratio:g} are {wavelength:.3g} "
-            f"long and take {settings.elements:,} elements, more than {_MOST_ELEMENTS:,}.",
+            f"long and take {elements:,} elements, more than {_MOST_ELEMENTS:,}.",
             advice=f"{_mirrored_more(params)}ake a thicker or stiffer exocarp.",
         )
-    return settings
+    return few
 
 
 def _mirrored_more(params: DehydrationParams) -> str:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Floats, Singles
 from ..contract import Unstable
+from .kernel import kinetic_energy
 from .kernel.march import SEARCH_EVERY
 from .motion import Motion
 
@@ -18,7 +19,7 @@ __all__ = ["State", "settle"]
 Fixed = NDArray[np.int32]
 
 #: Looks at the kinetic energy per swing, about; whole searches for contact lie between two.
-_LOOKS = 15
+_LOOKS = 10
 
 #: Steps in which a surface at rest may drift so far.
 _REST_STEPS = 200
@@ -45,8 +46,13 @@ _EASING, _EASING_PARTS, _EASED = 20.0, 2, 0.7
 #: Turns of calming alone in which a state comes to rest under new rest volumes, before it swings again.
 _CALM_TURNS = 3
 
-#: Calm steps between two looks at residual and drift.
-_CALM_LOOK = 200
+#: Calm steps between two looks at residual and drift, after a swing and of a smooth fruit, which creeps to its radius.
+_CALM_LOOK, _SMOOTH_LOOK = 100, 200
+
+#: Part of its strain energy that a turn gives up where it is one of the last, and how many of those follow each other.
+#: Ways can be so soft that forces balance in the middle of one: eighths at te = 0.04 that were left where they balanced
+#: would have gone on, most of them by a third of their roughness.
+_GIVEN_UP, _LAST_TURNS = 1e-3, 1
 
 #: Swings that a state is left to itself to show whether it is stable, and the rms way of the surface [te] after which
 #: it was not: of what is seen to be smooth, and of what may have buckles, whose soft ways are longer. 1 % past the
@@ -86,7 +92,7 @@ def settle(
     with_energy: bool = True,
     smooth: Callable[[Fixed], bool] | None = None,
 ) -> State:
-    """Hold the shrinkage until forces balance *and* the surface has come to rest.
+    """Hold the shrinkage until forces balance, the surface has come to rest *and* it would stay there.
 
     Just past the onset the forces nearly balance while buckles still grow, so the residual alone would stop there.
     It swings to where the energy leads: after the onset buckles go on merging for thousands of steps, along ways
@@ -100,6 +106,10 @@ def settle(
     a stiff skin. Where a state balances they go half of the way to those of its pressures, and it is calmed alone for
     a few turns; while it is eased, and near balance after a swing and at last, they do so, too; in a swing they follow
     a little. So on, until they are off (rms) by no more than forces may be.
+
+    What balances may still be in the middle of a soft way. So it goes on, turn by turn, each a swing and what it takes
+    to balance after it, until one gives up next to no energy. A turn that does not balance in the steps that are left
+    is taken back.
 
     smooth: whether a state at rest may have no buckles yet. Such a one is left to swing, and where it goes elsewhere
     settles there: a smooth fruit past its onset balances and is not stable, but buckles grow from its bumps, at first
@@ -118,9 +128,12 @@ def settle(
         return State(whole, shrinkage, 0.0, 0.0, motion.steps, 1.0, 0.0, rest, 0.0)
     arrived = state.copy() if with_release else None
     rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
-    looked_at = smooth is not None and spent < settings.settle_steps and smooth(state)
-    if looked_at and _leaves(motion, state, velocity, rest, shrinkage):
-        rest, _, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
+    stays = smooth is not None and spent < settings.settle_steps and smooth(state)
+    if stays and _leaves(motion, state, velocity, rest, shrinkage):
+        rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
+        stays = False
+    if shrinkage > settings.start and not stays and residual <= settings.residual and drift <= settings.drift:
+        rest, residual, drift = _to_the_end(motion, state, velocity, (rest, residual, drift), shrinkage, spent)
     energy, least = motion.strained(state, rest, shrinkage, with_energy)
     if least <= 0:
         raise Unstable(
@@ -137,13 +150,49 @@ def settle(
     return State(whole, shrinkage, residual, drift, motion.steps, least, energy, rest, released)
 
 
+def _to_the_end(
+    motion: Motion,
+    state: Fixed,
+    velocity: Singles,
+    found: tuple[Floats, float, float],
+    shrinkage: float,
+    spent: int,
+) -> tuple[Floats, float, float]:
+    """Let a state that balances go on until it gives up next to no energy; return rest volumes, residual and drift.
+
+    found: those that it has. spent: steps that it has taken to balance.
+    """
+    settings, last = motion.settings, 0
+    while last < _LAST_TURNS and spent + settings.swing_steps < settings.settle_steps:
+        before, masses = state.copy(), motion.masses
+        try:
+            rest = _swung(motion, state, velocity, found[0], shrinkage)
+            spent += settings.swing_steps
+            rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage, spent)
+        except Unstable:
+            residual, drift = np.inf, np.inf
+        if residual > settings.residual or drift > settings.drift:
+            state[:], motion.masses = before, masses
+            velocity[:] = 0
+            break
+        found = rest, residual, drift
+        # under the same rest volumes: energies under others do not compare
+        begun, now = (motion.marched_energy(each, rest, shrinkage) for each in (before, state))
+        last = last + 1 if begun - now <= _GIVEN_UP * now else 0
+    return found
+
+
 def _come_to_rest(
-    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float
+    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, spent: int = 0
 ) -> tuple[Floats, int, float, float]:
-    """Swing and calm by turns; return the rest volumes, the steps spent, the residual and the drift."""
+    """Swing and calm by turns; return the rest volumes, the steps spent, the residual and the drift.
+
+    spent: steps before, of a state that has swung already.
+    """
     settings = motion.settings
-    spent, residual, drift, behind = 0, np.inf, np.inf, np.inf
-    calm, eases = 0 if shrinkage > settings.start else 1, False
+    residual, drift, behind = np.inf, np.inf, np.inf
+    swings = shrinkage > settings.start
+    calm, eases = 0 if swings and not spent else 1, False
     while spent < settings.settle_steps:
         late, before = spent >= _SWINGING * settings.settle_steps, residual
         if late or eases:
@@ -156,7 +205,7 @@ def _come_to_rest(
         while (residual > settings.residual or drift > settings.drift) and rested < settings.calm_steps:
             surface = motion.surface(state)
             # rest volumes stay: under some that go on following, forces have no potential and hardly balance
-            count = min(_CALM_LOOK, max(20, motion.slice))
+            count = min(_CALM_LOOK if swings else _SMOOTH_LOOK, max(20, motion.slice))
             motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.calm_damping)
             rested += count
             residual = motion.residual(state, rest, shrinkage, settings.calm_damping)
@@ -239,8 +288,7 @@ def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrink
     last = 0.0
     for _ in range(round(settings.swing_steps / count)):
         motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.swing_damping)
-        layout = motion.layout
-        energy = float((layout.mass * np.square(velocity[:, :3]).sum(axis=1, dtype=np.float64))[layout.free].sum())
+        energy = kinetic_energy(motion.layout, velocity)
         falls = energy < last
         if falls:
             velocity[:] = energy = 0.0

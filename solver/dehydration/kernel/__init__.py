@@ -6,6 +6,7 @@ holds its two compiled back ends (chosen by WIZEN_KERNEL = auto, vector or scala
 """
 
 from solver.dehydration.kernel.bulk import dilatations, pressure_energy, rested, rests, without_bulk
+from solver.dehydration.kernel.coupled import Weights, held_outside, momentum
 from solver.dehydration.kernel.diagnostics import (
     ElementReport,
     element_report,
@@ -32,16 +33,19 @@ __all__ = [
     "InternalForce",
     "Layout",
     "Skin",
+    "Weights",
     "build_layout",
     "default_backend",
     "dilatations",
     "element_report",
     "forget",
+    "held_outside",
     "internal_force",
     "kinetic_energy",
     "least_ratios",
     "make_skin",
     "march",
+    "momentum",
     "new_state",
     "out_of_reach",
     "place",

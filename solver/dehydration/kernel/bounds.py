@@ -14,7 +14,7 @@ from ...arrays import Bools, Floats, Ints, Ints32
 from .fixed_point import QUANTUM
 from .metric import SLOPES, quadrature
 
-__all__ = ["element_bounds", "nodal_sums"]
+__all__ = ["element_bounds", "nodal_sums", "split_bounds"]
 
 
 @njit(cache=True, error_model="numpy")
@@ -33,6 +33,64 @@ def _sound(x: Floats, least_share: float) -> bool:
         volume = (uy * vz - uz * vy) * wx + (uz * vx - ux * vz) * wy + (ux * vy - uy * vx) * wz
         least, most = min(least, sign * volume), max(most, sign * volume)
     return least > least_share * most
+
+
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "nsz", "arcp", "contract"})
+def _stiffness(x: Floats, slopes: Floats, weights: Floats, g: Floats, b: Floats, l: Floats) -> float:  # noqa: E741
+    """Volume of an element with corners x (8, 3); adds its gradient to b (8, 3), and L to l (8, 8). g (8, 3): room."""
+    volume = 0.0
+    for q in range(weights.size):
+        j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0
+        for a in range(8):
+            s, t, u = slopes[q, a, 0], slopes[q, a, 1], slopes[q, a, 2]
+            j00, j01, j02 = j00 + x[a, 0] * s, j01 + x[a, 0] * t, j02 + x[a, 0] * u
+            j10, j11, j12 = j10 + x[a, 1] * s, j11 + x[a, 1] * t, j12 + x[a, 1] * u
+            j20, j21, j22 = j20 + x[a, 2] * s, j21 + x[a, 2] * t, j22 + x[a, 2] * u
+        c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
+        determinant = j00 * c00 + j01 * c01 + j02 * c02
+        r = 1.0 / determinant
+        i10, i11, i12 = (j02 * j21 - j01 * j22) * r, (j00 * j22 - j02 * j20) * r, (j01 * j20 - j00 * j21) * r
+        i20, i21, i22 = (j01 * j12 - j02 * j11) * r, (j02 * j10 - j00 * j12) * r, (j00 * j11 - j01 * j10) * r
+        i00, i01, i02 = c00 * r, c01 * r, c02 * r
+        v = determinant * weights[q]
+        volume += v
+        for a in range(8):
+            s, t, u = slopes[q, a, 0], slopes[q, a, 1], slopes[q, a, 2]
+            g[a, 0] = s * i00 + t * i01 + u * i02
+            g[a, 1] = s * i10 + t * i11 + u * i12
+            g[a, 2] = s * i20 + t * i21 + u * i22
+        for a in range(8):
+            for k in range(3):
+                b[a, k] += v * g[a, k]
+            for c in range(a, 8):
+                l[a, c] += v * (g[a, 0] * g[c, 0] + g[a, 1] * g[c, 1] + g[a, 2] * g[c, 2])
+    for a in range(8):
+        for c in range(a):
+            l[a, c] = l[c, a]
+    return volume
+
+
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "nsz", "arcp", "contract"})
+def _largest(l: Floats, b: Floats, volume: float, mu: float, kappa: float) -> float:  # noqa: E741
+    """The bound for scalar stiffness l (k, k) and volume gradient b (k, 3)."""
+    count = len(l)
+    squared = norm = along = 0.0
+    for a in range(count):
+        for c in range(a, count):
+            entry = 0.0
+            for k in range(count):
+                entry += l[a, k] * l[c, k]
+            squared += entry * entry if c == a else 2.0 * entry * entry
+        for k in range(3):
+            entry = 0.0
+            for c in range(count):
+                entry += l[a, c] * b[c, k]
+            along += b[a, k] * entry
+            norm += b[a, k] * b[a, k]
+    shear = 2.0 * mu * math.sqrt(math.sqrt(squared))
+    bulk = kappa * norm / volume
+    total = bulk + 2.0 * mu * along / norm + shear
+    return 0.5 * (total + math.sqrt(max(total * total - 4.0 * bulk * shear, 0.0)))
 
 
 @njit(cache=True, error_model="numpy", parallel=True, fastmath={"reassoc", "nsz", "arcp", "contract"})
@@ -57,52 +115,8 @@ def _bounds(
         if not _sound(x, least_share):
             bound[e] = 0.0
             continue
-        volume = 0.0
-        for q in range(weights.size):
-            j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0
-            for a in range(8):
-                s, t, u = slopes[q, a, 0], slopes[q, a, 1], slopes[q, a, 2]
-                j00, j01, j02 = j00 + x[a, 0] * s, j01 + x[a, 0] * t, j02 + x[a, 0] * u
-                j10, j11, j12 = j10 + x[a, 1] * s, j11 + x[a, 1] * t, j12 + x[a, 1] * u
-                j20, j21, j22 = j20 + x[a, 2] * s, j21 + x[a, 2] * t, j22 + x[a, 2] * u
-            c00, c01, c02 = j11 * j22 - j12 * j21, j12 * j20 - j10 * j22, j10 * j21 - j11 * j20
-            determinant = j00 * c00 + j01 * c01 + j02 * c02
-            r = 1.0 / determinant
-            i10, i11, i12 = (j02 * j21 - j01 * j22) * r, (j00 * j22 - j02 * j20) * r, (j01 * j20 - j00 * j21) * r
-            i20, i21, i22 = (j01 * j12 - j02 * j11) * r, (j02 * j10 - j00 * j12) * r, (j00 * j11 - j01 * j10) * r
-            i00, i01, i02 = c00 * r, c01 * r, c02 * r
-            v = determinant * weights[q]
-            volume += v
-            for a in range(8):
-                s, t, u = slopes[q, a, 0], slopes[q, a, 1], slopes[q, a, 2]
-                g[a, 0] = s * i00 + t * i01 + u * i02
-                g[a, 1] = s * i10 + t * i11 + u * i12
-                g[a, 2] = s * i20 + t * i21 + u * i22
-            for a in range(8):
-                for k in range(3):
-                    b[a, k] += v * g[a, k]
-                for c in range(a, 8):
-                    l[a, c] += v * (g[a, 0] * g[c, 0] + g[a, 1] * g[c, 1] + g[a, 2] * g[c, 2])
-        for a in range(8):
-            for c in range(a):
-                l[a, c] = l[c, a]
-        squared = norm = along = 0.0
-        for a in range(8):
-            for c in range(a, 8):
-                entry = 0.0
-                for k in range(8):
-                    entry += l[a, k] * l[c, k]
-                squared += entry * entry if c == a else 2.0 * entry * entry
-            for k in range(3):
-                entry = 0.0
-                for c in range(8):
-                    entry += l[a, c] * b[c, k]
-                along += b[a, k] * entry
-                norm += b[a, k] * b[a, k]
-        shear = 2.0 * mu[e] * math.sqrt(math.sqrt(squared))
-        bulk = kappa[e] * norm / volume
-        total = bulk + 2.0 * mu[e] * along / norm + shear
-        bound[e] = 0.5 * (total + math.sqrt(max(total * total - 4.0 * bulk * shear, 0.0)))
+        volume = _stiffness(x, slopes, weights, g, b, l)
+        bound[e] = _largest(l, b, volume, mu[e], kappa[e])
 
 
 def element_bounds(
@@ -117,6 +131,53 @@ def element_bounds(
         elements = np.flatnonzero(is_exocarp == exocarp)
         _bounds(state, connectivity, elements, SLOPES[exocarp], quadrature(exocarp)[1], mu, kappa, least_share, bound)
     return bound
+
+
+@njit(cache=True, error_model="numpy", parallel=True, fastmath={"reassoc", "nsz", "arcp", "contract"})
+def _split_bounds(
+    state: Ints32,
+    connectivity: Ints,
+    elements: Ints,
+    slopes: Floats,
+    weights: Floats,
+    mu: Floats,
+    kappa: Floats,
+    least_share: float,
+    bounds: Floats,
+) -> None:
+    """Fill bounds (2, ne) of `elements`; arguments as in `_bounds`."""
+    for place in prange(elements.size):
+        e = elements[place]
+        x, b, g, l = np.empty((8, 3)), np.zeros((8, 3)), np.empty((8, 3)), np.zeros((8, 8))  # noqa: E741
+        for a in range(8):
+            for i in range(3):
+                x[a, i] = state[connectivity[e, a], i] * QUANTUM
+        if not _sound(x, least_share):
+            bounds[:, e] = 0.0
+            continue
+        volume = _stiffness(x, slopes, weights, g, b, l)
+        part, slope = np.empty((4, 4)), np.empty((4, 3))
+        for k in range(2):
+            sign = 1.0 - 2.0 * k
+            for a in range(4):
+                for c in range(4):
+                    across = l[2 * a, 2 * c + 1] + l[2 * a + 1, 2 * c]
+                    part[a, c] = 0.5 * (l[2 * a, 2 * c] + l[2 * a + 1, 2 * c + 1] + sign * across)
+                for i in range(3):
+                    slope[a, i] = math.sqrt(0.5) * (b[2 * a + 1, i] + sign * b[2 * a, i])
+            bounds[k, e] = _largest(part, slope, volume, mu[e], kappa[e])
+
+
+def split_bounds(
+    state: Ints32, connectivity: Ints, is_exocarp: Bools, mu: Floats, kappa: Floats, least_share: float
+) -> Floats:
+    """Likewise (2, ne) of a skin's elements for motion as one of the ends of its edges along zeta, and for their
+    parting; 0 of other elements.
+    """
+    bounds = np.zeros((2, len(connectivity)))
+    elements = np.flatnonzero(is_exocarp)
+    _split_bounds(state, connectivity, elements, SLOPES[True], quadrature(True)[1], mu, kappa, least_share, bounds)
+    return bounds
 
 
 @njit(cache=True, error_model="numpy")

@@ -75,12 +75,13 @@ def dilatations(layout: Layout, state: Ints32, theta: float) -> Floats:
     return found
 
 
-def rests(dilatation: Floats, kappa: float, wanted: float) -> Floats:
+def rests(dilatation: Floats, kappa: Floats | float, wanted: float) -> Floats:
     """Rest volumes g (ne,) that go with the pressure kappa times `dilatation` (ne,), measured under the g before.
 
-    A pressure beyond kappa / 4 is that of an element about to be crushed: only that much of it is taken.
+    kappa: of every element, or of all. A pressure beyond its half is that of an element about to be crushed: only that
+    much of it is taken; of a pull, which cannot crush, twice kappa.
     """
-    strain = np.clip(dilatation, -0.25, 0.25)
+    strain = np.clip(dilatation, -0.5, 2.0)
     g: Floats = (1 + strain * kappa / wanted) / (1 + strain)
     return g
 
@@ -115,8 +116,8 @@ def without_bulk(layout: Layout) -> Layout:
     return dataclasses.replace(layout, core_planes=planes[0], exocarp_planes=planes[1], one_point_planes=planes[2])
 
 
-def pressure_energy(layout: Layout, dilatation: Floats, theta: float, share: float) -> Floats:
-    """Energy (ne,) of pressures kappa times `dilatation` (ne,) in flesh whose bulk modulus is kappa / `share`.
+def pressure_energy(layout: Layout, dilatation: Floats, theta: float, share: Floats | float) -> Floats:
+    """Energy (ne,) of pressures kappa times `dilatation` (ne,) in flesh whose bulk modulus is kappa / `share` (ne,).
 
     layout: without rest volumes, which hold what the march's bulk modulus alone would let go.
     """

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.dehydration.kernel.algebra import Number
+from solver.dehydration.kernel.coupled import momentum
 from solver.dehydration.kernel.elements import energy, least_ratio, one_point_energy
 from solver.dehydration.kernel.fixed_point import positions
 from solver.dehydration.kernel.layout import Layout
@@ -113,5 +114,5 @@ def strain_energy(layout: Layout, state: Ints32, theta: float, *, one_point: boo
 
 def kinetic_energy(layout: Layout, velocity: NDArray[np.floating]) -> float:
     """Kinetic energy of the scaled masses; velocity (nodes, 3 or 4), displacement per step."""
-    squared = np.square(velocity[:, :3], dtype=np.float64).sum(axis=1)
-    return float(0.5 * np.sum(np.where(layout.free, layout.mass * squared, 0.0)))
+    doubled = (velocity[:, :3] * momentum(layout, velocity)).sum(axis=1)
+    return float(0.5 * np.sum(np.where(layout.free, doubled, 0.0)))

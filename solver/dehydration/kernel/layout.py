@@ -11,11 +11,13 @@ from numba import get_num_threads
 from numpy.typing import ArrayLike, DTypeLike
 
 from solver.dehydration.kernel.algebra import CORE_PLANES, EXOCARP_PLANES, ONE_POINT_PLANES
+from solver.dehydration.kernel.bounds import split_bounds
+from solver.dehydration.kernel.coupled import pays, weights
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.fixed_point import positions as positions_of
 from solver.dehydration.kernel.masses import largest_stiffness
 from solver.dehydration.kernel.metric import element_planes, one_point_planes, refuse_inverted
-from solver.dehydration.kernel.strips import LANES, Strips, assembly_rows, build_strips, group_order
+from solver.dehydration.kernel.strips import GROUP, LANES, Strips, assembly_rows, build_strips, group_order
 
 from ...arrays import Array, Bools, Floats, Ints, Ints32, Singles
 
@@ -69,7 +71,7 @@ class Layout:
     groups: Ints32
     """(groups,): order in which groups of nodes are moved (see `strips.group_order`)"""
     inverse_mass: Singles
-    """(nodes,): 1 / scaled mass, 0 where fixed"""
+    """(nodes,): diagonal of the inverse of the scaled masses, 0 where fixed"""
     core_elements: Ints
     """(core blocks, 16): element of each lane; -1 where a lane only fills the vector"""
     exocarp_elements: Ints
@@ -79,7 +81,13 @@ class Layout:
     fresh: Ints32
     """(nodes, 4): fresh positions as the kernel's state (see `fixed_point`); the fourth column is unused and 0"""
     mass: Floats
-    """(nodes,): scaled mass, of fixed nodes too"""
+    """(nodes,): diagonal of the scaled masses, of fixed nodes too"""
+    pull: Floats
+    """(nodes,): what stands beside the diagonal, between a node and the next; empty where nodes share no masses"""
+    tops: Ints32
+    """outer nodes of the columns of a skin that share their masses (see `coupled`), in the order of `groups`"""
+    spread: Singles
+    """(tops, 6): rows of A without its diagonal, of a column's nodes from the inside out (see `coupled`)"""
     full_levels: int
     """outermost core levels that are integrated fully even where the one-point core is asked for"""
     planes: Ints32
@@ -177,6 +185,7 @@ def build_layout(
     one_point: bool = True,
     full_levels: int = 0,
     mirrored: ArrayLike = (),
+    tops: ArrayLike = (),
 ) -> Layout:
     """Prepare a mesh for `march`.
 
@@ -185,7 +194,8 @@ def build_layout(
     fixed: (nn,) nodes that never move (the stone). safety: factor on the scaled masses against stiffening while the
     fruit deforms; the critical time step is at least sqrt(safety) at rest and a unit step is marched. Swelling to
     theta > 1 stiffens by theta: multiply safety by it. one_point: prepare the one-point core element as well.
-    full_levels: see `Layout`. mirrored: numbers 3 node + axis of coordinates that stay 0.
+    full_levels: see `Layout`. mirrored: numbers 3 node + axis of coordinates that stay 0. tops: outer nodes of a skin
+    of two layers whose columns are three nodes in a row; they share their masses if the skin is thin.
 
     Raises ValueError with what to change for inputs that are not a mesh.
     """
@@ -201,10 +211,17 @@ def build_layout(
     corners = positions_of(fresh)[connect]
 
     refuse_inverted(corners)
-    mass = _masses(connect, corners, skin, shear, bulk, safety, nodes)
-
+    bounds = np.zeros((3, len(connect)))
+    bounds[0] = _bounds(connect, corners, skin, shear, bulk)
+    outer = np.asarray(tops, np.int64)
+    if len(outer):
+        bounds[1:] = split_bounds(fresh, connect, skin, shear, bulk, -np.inf)
+        outer = outer if pays(bounds, skin) else outer[:0]
     core_planes, single_planes, exocarp_planes = _planes(strips, corners, shear, bulk, one_point)
     row_start, rows = assembly_rows(strips, nodes)
+    groups = group_order(row_start, rows, strips, get_num_threads())
+    in_turn = _in_turn(outer, groups)
+    weighed = weights(connect, skin, held, in_turn, bounds, safety)
     return Layout(
         nodes=nodes,
         elements=len(connect),
@@ -215,36 +232,32 @@ def build_layout(
         exocarp_planes=exocarp_planes,
         row_start=aligned_copy(row_start, np.int32),
         rows=aligned_copy(ROW * rows, np.int32),
-        groups=aligned_copy(group_order(row_start, rows, strips, get_num_threads()), np.int32),
-        inverse_mass=aligned_copy(_inverse(mass, held), np.float32),
+        groups=aligned_copy(groups, np.int32),
+        tops=in_turn,
         core_elements=np.where(strips.core_real, strips.core, -1),
         exocarp_elements=np.where(strips.exocarp_real, strips.exocarp, -1),
         connectivity=connect,
         fresh=fresh,
-        mass=mass.astype(np.float64, copy=False),
+        **weighed._asdict(),
         full_levels=full_levels,
         planes=_places(mirrored),
     )
 
 
-def _masses(
-    connect: Ints, corners: Floats, skin: Bools, shear: Floats, bulk: Floats, safety: float, nodes: int
-) -> Floats:
-    """Scaled masses (nodes,), with which the critical time step is at least sqrt(safety)."""
-    mass = np.empty(len(connect))
+def _bounds(connect: Ints, corners: Floats, skin: Bools, shear: Floats, bulk: Floats) -> Floats:
+    """Upper bounds (ne,) of the elements' largest stiffness, whichever way the core is integrated."""
+    bounds = np.empty(len(connect))
     for exocarp in (False, True):
         chosen = skin == exocarp
-        mass[chosen] = safety * largest_stiffness(corners[chosen], shear[chosen], bulk[chosen], exocarp) / 4
-    masses: Floats = np.bincount(connect.ravel(), weights=np.repeat(mass, 8), minlength=nodes).astype(np.float64)
-    return masses
+        bounds[chosen] = largest_stiffness(corners[chosen], shear[chosen], bulk[chosen], exocarp)
+    return bounds
 
 
-def _inverse(mass: Floats, held: Bools) -> Floats:
-    """1 / mass (nodes,), 0 of nodes that are held or in no element."""
-    inverse = np.zeros(len(mass))
-    moving = ~held & (mass > 0)
-    inverse[moving] = 1 / mass[moving]
-    return inverse
+def _in_turn(tops: Ints, groups: Ints) -> Ints32:
+    """The outer nodes of columns, sorted by when their groups are moved: by the thread that has pushed them, mostly."""
+    turn = np.empty(len(groups), np.int64)
+    turn[groups] = np.arange(len(groups)) * get_num_threads() // max(len(groups), 1)
+    return tops[np.argsort(turn[tops // GROUP], kind="stable")].astype(np.int32)
 
 
 def _places(mirrored: ArrayLike) -> Ints32:

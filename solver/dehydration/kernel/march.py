@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from solver.dehydration.contact.contact import SLACK, measure, near
 from solver.dehydration.contact.data import PAIRS, SHARES, make_contact
 from solver.dehydration.contact.search import is_stale
+from solver.dehydration.kernel.coupled import are_alike, mix
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.generate.digest import source_digest
 from solver.dehydration.kernel.layout import ALL, ROW, Layout, aligned_zeros
@@ -36,6 +37,7 @@ logger = logging.getLogger("wizen.dehydration.kernel")
 # the key of its cache, and an intrinsic pickles differently in every process.
 strip_forces: Any = None
 update_nodes: Any = None
+mix_alike: Any = None
 
 _FLAT, _INDICES = types.float32[::1], types.int32[::1]
 _PLANES = types.float32[:, :, ::1]
@@ -47,10 +49,10 @@ SMALL = 4000
 
 def _nobody() -> Skin:
     """A skin of one quad: stands in where no contact is wanted, and gives numba the type."""
-    node = np.zeros(1, np.float32)
+    node, below = np.zeros(1, np.float32), np.zeros((1, 2), np.float32)
     contact = make_contact(range(4), [[0, 1, 2, 3]], [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], 0.0)
     image, own = np.ones((1, 3), np.float32), np.ones(1, np.bool_)
-    return Skin(contact, np.zeros(1, np.int32), image, own, node, node.reshape(1, 1), node.reshape(1, 1), node)
+    return Skin(contact, np.zeros(1, np.int32), image, own, node, node.reshape(1, 1), node.reshape(1, 1), node, below)
 
 
 @njit(error_model="numpy")
@@ -76,6 +78,8 @@ _SIGNATURE = types.int64(
     _INDICES,  # row start
     _INDICES,  # rows
     _INDICES,  # groups of nodes in the order in which they are moved
+    _INDICES,  # tops of columns that share their masses
+    types.float32[:, ::1],  # their shares
     _FLAT,  # inverse mass
     types.float64,  # theta at the start
     types.float64,  # theta at the end
@@ -102,9 +106,9 @@ def _build(stamp: int) -> Callable[..., int]:
     )
     def advance(
         steps: int, state: State, velocity: Singles, strips: Ints, face_offsets: State, core: Singles,
-        one_point: Singles, exocarp: Singles, full: int, row_start: State, rows: State, groups: State,
-        inverse_mass: Singles, theta0: float, theta1: float, damping: float, forces: Singles, record: bool,
-        squares: Singles, planes: State, touching: bool, skin: Skin,
+        one_point: Singles, exocarp: Singles, full: int, row_start: State, rows: State, groups: State, tops: State,
+        spread: Singles, inverse_mass: Singles, theta0: float, theta1: float, damping: float, forces: Singles,
+        record: bool, squares: Singles, planes: State, touching: bool, skin: Skin,
     ) -> int:  # fmt: skip
         source = stamp  # noqa: F841  a captured cell is part of numba's cache key
         keep = np.float32((1 - damping / 2) / (1 + damping / 2))
@@ -114,6 +118,7 @@ def _build(stamp: int) -> Callable[..., int]:
         limits, values, weights, counts = contact.limits, contact.values, contact.weights, contact.counts
         reads, surface_nodes, extremes = contact.reads, contact.surface_nodes, contact.extremes
         skin_rows, sign, own, position, speed = skin.rows, skin.sign, skin.own, skin.position, skin.velocity
+        below = skin.below
         slack, clearance = SLACK * contact.margin, contact.clearance
         for step in range(steps):
             if touching and (step % SEARCH_EVERY == 0 or is_stale(contact)) and not search(skin, state, velocity):
@@ -125,6 +130,12 @@ def _build(stamp: int) -> Callable[..., int]:
                     theta, forces, record, squares,
                 )  # fmt: skip
             if not record:
+                for column in prange(tops.size):
+                    here = np.int64(column)
+                    if are_alike(row_start, tops, here):
+                        mix_alike(forces, row_start, rows, tops, spread, here)
+                    else:
+                        mix(forces, row_start, rows, tops, spread, here)
                 for turn in prange(groups.size):
                     group = np.int64(groups[turn])
                     update_nodes(forces, row_start, rows, inverse_mass, state, velocity, keep, push, group)
@@ -143,7 +154,7 @@ def _build(stamp: int) -> Callable[..., int]:
                         )  # fmt: skip
                     if keep_apart(skin, state, velocity):
                         for share in prange(SHARES):
-                            give(skin_rows, own, speed, reads, counts, state, velocity, np.int64(share))
+                            give(skin_rows, own, below, speed, reads, counts, state, velocity, np.int64(share))
                     stay(planes, state, velocity)
         return steps
 
@@ -154,11 +165,11 @@ def _build(stamp: int) -> Callable[..., int]:
 @functools.cache
 def compiled(backend: Backend) -> Callable[..., int]:
     """The time loop on one back end."""
-    global strip_forces, update_nodes
+    global strip_forces, update_nodes, mix_alike
     functions: Any = importlib.import_module(
         "solver.dehydration.kernel.generate." + ("vector_ir" if backend == "vector" else "scalar")
     )
-    strip_forces, update_nodes = functions.strip_forces, functions.update_nodes
+    strip_forces, update_nodes, mix_alike = functions.strip_forces, functions.update_nodes, functions.mix_alike
     return _build(int(source_digest(backend)[:15], 16))
 
 
@@ -204,7 +215,7 @@ def _arrays(layout: Layout, one_point: bool) -> tuple[Any, ...]:
     return (
         layout.strips, layout.face_offsets, layout.core_planes, layout.one_point_planes, layout.exocarp_planes,
         layout.full_levels if one_point else ALL, layout.row_start, layout.rows,
-        layout.groups, layout.inverse_mass,
+        layout.groups, layout.tops, layout.spread, layout.inverse_mass,
     )  # fmt: skip
 
 

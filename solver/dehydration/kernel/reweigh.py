@@ -10,7 +10,8 @@ import dataclasses
 
 import numpy as np
 
-from solver.dehydration.kernel.bounds import element_bounds, nodal_sums
+from solver.dehydration.kernel.bounds import element_bounds, split_bounds
+from solver.dehydration.kernel.coupled import weights
 from solver.dehydration.kernel.layout import Layout
 
 from ...arrays import Bools, Floats, Ints32
@@ -31,14 +32,12 @@ def reweigh(
 ) -> Layout:
     """The layout with masses for the elements as they are at `state` (nodes, 4).
 
-    is_exocarp, mu, kappa (ne,): as given to `build_layout`. fresh_bound (ne,): `stiffness_bounds` at the fresh state,
+    is_exocarp, mu, kappa (ne,): as given to `build_layout`. fresh_bound (3, ne): `stiffness_bounds` at the fresh state,
     below which no element's bound falls.
     """
-    bound = np.maximum(fresh_bound, stiffness_bounds(layout, state, is_exocarp, mu, kappa))
-    mass = nodal_sums(layout.connectivity, safety * bound / 4, layout.nodes)
-    inverse = np.zeros(layout.nodes, np.float32)
-    inverse[layout.free] = 1 / mass[layout.free]
-    return dataclasses.replace(layout, mass=mass, inverse_mass=inverse)
+    bounds = np.maximum(fresh_bound, stiffness_bounds(layout, state, is_exocarp, mu, kappa))
+    found = weights(layout.connectivity, is_exocarp, ~layout.free, layout.tops, bounds, safety)
+    return dataclasses.replace(layout, **found._asdict())
 
 
 def stiffness_bounds(
@@ -50,9 +49,12 @@ def stiffness_bounds(
     *,
     even_crushed: bool = False,
 ) -> Floats:
-    """Upper bound (ne,) of each element's largest stiffness at `state`; 0 for elements too crushed to have one.
+    """Upper bounds (3, ne) of each element's largest stiffness at `state`; 0 for elements too crushed to have one.
 
-    even_crushed: take it of those as well, as for a fresh mesh, which has slender but no inverted ones.
+    First on the whole, then, where the layout's columns share their masses, of the skin's motion as one and of its
+    parting (see `coupled`). even_crushed: take it of those as well, as for a fresh mesh, which has slender but no
+    inverted ones.
     """
-    least_share = -np.inf if even_crushed else LEAST_VOLUME
-    return element_bounds(state, layout.connectivity, is_exocarp, mu, kappa, least_share)
+    given = state, layout.connectivity, is_exocarp, mu, kappa, -np.inf if even_crushed else LEAST_VOLUME
+    split = split_bounds(*given) if len(layout.tops) else np.zeros((2, layout.elements))
+    return np.concatenate([element_bounds(*given)[None], split])

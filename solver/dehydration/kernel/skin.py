@@ -41,6 +41,8 @@ class Skin(NamedTuple):
     """(ns, 4)"""
     inverse_mass: Singles
     """(ns,)"""
+    below: Singles
+    """(ns, 2) of a push on a node, what the next two inwards get where they share their masses with it, else 0"""
 
 
 def make_skin(
@@ -74,12 +76,23 @@ def make_skin(
         np.zeros((len(rows), 4), np.float32),
         np.zeros((len(rows), 4), np.float32),
         layout.inverse_mass[rows] * shares.astype(np.float32),
+        _below(layout, rows),
     )
+
+
+def _below(layout: Layout, rows: Ints32) -> Singles:
+    """Of a push on the nodes `rows`, what the next two inwards get: M^-1 of both over M^-1 of the node itself."""
+    found = np.zeros((layout.nodes, 2), np.float32)
+    if len(layout.tops):
+        found[layout.tops] = layout.spread[:, [5, 4]]
+    below: Singles = found[rows]
+    return below
 
 
 def weigh(skin: Skin, layout: Layout) -> None:
     """Take the layout's masses."""
     skin.inverse_mass[:] = layout.inverse_mass[skin.rows] * skin.share
+    skin.below[:] = _below(layout, skin.rows)
 
 
 def forget(skin: Skin, layout: Layout) -> None:
@@ -132,7 +145,9 @@ def approach(
 
 
 @njit(**OPTIONS, forceinline=True)
-def _write_node(rows: Ints32, own: Bools, speed: Singles, state: Ints32, velocity: Singles, i: int) -> None:
+def _write_node(
+    rows: Ints32, own: Bools, below: Singles, speed: Singles, state: Ints32, velocity: Singles, i: int
+) -> None:
     """Give the fruit what contact has changed of a node that is no image; a second time there is nothing to give."""
     if not own[i]:
         return
@@ -142,15 +157,22 @@ def _write_node(rows: Ints32, own: Bools, speed: Singles, state: Ints32, velocit
         if push != 0:
             velocity[first + k] = speed[i, k]
             state[first + k] += np.int32(np.rint(push * QUANTA))
+            for under in range(2):
+                share = below[i, under]
+                if share != 0:
+                    place = first - 4 * (under + 1) + k
+                    velocity[place] += share * push
+                    state[place] += np.int32(np.rint(share * push * QUANTA))
 
 
 @njit(**OPTIONS, forceinline=True)
 def give(
-    rows: Ints32, own: Bools, speed: Singles, reads: Ints32, counts: Ints, state: Ints32, velocity: Singles, share: int
-) -> None:
+    rows: Ints32, own: Bools, below: Singles, speed: Singles, reads: Ints32, counts: Ints, state: Ints32,
+    velocity: Singles, share: int,
+) -> None:  # fmt: skip
     """Give the fruit what contact has changed of a share of the nodes; arguments as in `approach`."""
     for place in range(share * counts[READS] // SHARES, (share + 1) * counts[READS] // SHARES):
-        _write_node(rows, own, speed, state, velocity, reads[place])
+        _write_node(rows, own, below, speed, state, velocity, reads[place])
 
 
 @njit(**OPTIONS)
@@ -161,12 +183,12 @@ def keep_apart(skin: Skin, state: Ints32, velocity: Singles) -> bool:
     """
     contact = skin.contact
     resolve(contact, skin.position, skin.velocity, skin.inverse_mass)
-    rows, own, speed, counts = skin.rows, skin.own, skin.velocity, contact.counts
+    rows, own, below, speed, counts = skin.rows, skin.own, skin.below, skin.velocity, contact.counts
     pairs, hits, forces = contact.pairs, contact.hits, contact.hit_values
     if counts[HELD] != 0 or 4 * counts[HITS] > counts[READS]:
         return True
     for h in range(counts[HITS]):
         if forces[h, 1] != 0:
             for k in range(4):
-                _write_node(rows, own, speed, state, velocity, pairs[hits[h], k])
+                _write_node(rows, own, below, speed, state, velocity, pairs[hits[h], k])
     return False

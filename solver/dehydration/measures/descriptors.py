@@ -22,8 +22,9 @@ LOWEST_DEGREE = 3
 RESOLUTION, DEGREE = 128, 120
 #: Amplitude below which a surface counts as smooth: no degree, wavelength or buckle is read from noise.
 SMOOTH = 1e-5
-#: Share of the rms below which a place lies in a buckle.
-LOW = -0.5
+#: Share of the rms below which a place lies in a buckle, and the least depth of one [te]: bumps of a fruit that has not
+#: buckled are a hundredth of its skin.
+LOW, _SHALLOW = -0.5, 0.1
 
 
 class Descriptors(NamedTuple):
@@ -47,6 +48,7 @@ class Surface:
         theta, phi = lattice(RESOLUTION)
         self._fresh = fruit.surface(theta, phi)
         self._ray = self._fresh / np.linalg.norm(self._fresh, axis=-1, keepdims=True)
+        self._shallow = -_SHALLOW * fruit.exocarp_thickness
         self._fresh_nodes = mesh.positions[mesh.surface_nodes]
         self._weight = np.repeat(quadrature(RESOLUTION)[:, None], 2 * RESOLUTION, axis=1)
         along = np.linalg.norm(np.gradient(self._fresh, np.pi / RESOLUTION, axis=0), axis=-1)
@@ -76,7 +78,7 @@ class Surface:
             roughness,
             degree,
             float(wavelength),
-            _valleys(wrinkles, LOW * roughness),
+            _valleys(wrinkles, min(LOW * roughness, self._shallow)),
             self._anisotropy(wrinkles),
         )
 

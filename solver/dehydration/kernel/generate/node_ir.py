@@ -149,3 +149,32 @@ def update_nodes(
         return context.get_dummy_value()
 
     return signature, codegen
+
+
+@intrinsic
+def mix_alike(typingctx: Any, forces: Any, row_start: Any, rows: Any, tops: Any, spread: Any, place: Any) -> Any:
+    """`coupled.mix` of a column of which each of the three nodes has GROUP rows."""
+    arrays = (forces, row_start, rows, tops, spread)
+    signature = types.void(*arrays, types.int64)
+
+    def codegen(context: Any, build: Any, signature: Any, args: Any) -> Any:
+        views = [context.make_array(k)(context, build, v) for k, v in zip(signature.args[:5], args[:5], strict=True)]
+        force, start, row, top, share = (view.data for view in views)
+        low = build.sub(build.sext(build.load(at(build, top, args[5])), INT64), ir.Constant(INT64, 2))
+        entries = at(build, row, build.sext(build.load(at(build, start, low)), INT64))
+        places = [build.sext(build.load(at(build, entries, k)), INT64) for k in range(3 * GROUP)]
+        sums = [_sum_of_rows(build, force, places[GROUP * k : GROUP * (k + 1)]) for k in range(3)]
+        shares = at(build, share, build.mul(args[5], ir.Constant(INT64, 6)))
+        for k, (one, other) in enumerate(((1, 2), (0, 2), (0, 1))):
+            a, b = (splat(build, build.load(at(build, shares, 2 * k + i)), FOUR) for i in range(2))
+            first = at(build, force, places[GROUP * k])
+            gained = build.fadd(
+                build.fmul(a, sums[one], flags=FAST), build.fmul(b, sums[other], flags=FAST), flags=FAST
+            )
+            mixed = build.fadd(load(build, first, FOUR), gained, flags=FAST)
+            # the fourth is a neighbour's, which another thread may be adding to
+            for i in range(3):
+                build.store(build.extract_element(mixed, INT32(i)), at(build, first, i))
+        return context.get_dummy_value()
+
+    return signature, codegen

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from solver.dehydration.kernel.coupled import mix
 from solver.dehydration.kernel.fixed_point import QUANTUM
 from solver.dehydration.kernel.generate.source import load_generated
 from solver.dehydration.kernel.strips import GROUP, LANES
@@ -179,3 +180,9 @@ def update_nodes(
     """Update of a group of nodes; arguments as in `node_ir.update_nodes`."""
     for node in range(GROUP * group, min(GROUP * group + GROUP, inverse_mass.size)):
         update_node(forces, row_start, rows, inverse_mass, state, velocity, keep, push, node)
+
+
+@njit(inline="always")
+def mix_alike(forces: Singles, row_start: Ints32, rows: Ints32, tops: Ints32, spread: Singles, place: int) -> None:
+    """As `node_ir.mix_alike`."""
+    mix(forces, row_start, rows, tops, spread, place)

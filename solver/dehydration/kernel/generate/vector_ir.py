@@ -33,10 +33,10 @@ from solver.dehydration.kernel.generate.lanes import (
     store,
     store_rows,
 )
-from solver.dehydration.kernel.generate.node_ir import update_nodes
+from solver.dehydration.kernel.generate.node_ir import mix_alike, update_nodes
 from solver.dehydration.kernel.strips import LANES
 
-__all__ = ["strip_forces", "update_nodes"]
+__all__ = ["mix_alike", "strip_forces", "update_nodes"]
 
 CORNERS = 4
 Face: TypeAlias = list[list[Any]]
