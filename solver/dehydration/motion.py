@@ -111,7 +111,6 @@ class Motion:
             safety=_SAFETY,
             full_levels=settings.full_levels,
             mirrored=self.sector.planes,
-            tops=mesh.surface_nodes,
         )
         self.drive = Drive(params, mesh, self.layout)
         self._fresh_bound = stiffness_bounds(

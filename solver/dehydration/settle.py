@@ -120,20 +120,13 @@ def settle(
         Unstable: the state left the finite, or elements turned inside out.
 
     """
-    settings = motion.settings
     surface = motion.surface(state)
     if shrinkage == 0:
         whole = motion.sector.whole(surface)
         # free of stress: nothing to settle
         return State(whole, shrinkage, 0.0, 0.0, motion.steps, 1.0, 0.0, rest, 0.0)
     arrived = state.copy() if with_release else None
-    rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
-    stays = smooth is not None and spent < settings.settle_steps and smooth(state)
-    if stays and _leaves(motion, state, velocity, rest, shrinkage):
-        rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
-        stays = False
-    if shrinkage > settings.start and not stays and residual <= settings.residual and drift <= settings.drift:
-        rest, residual, drift = _to_the_end(motion, state, velocity, (rest, residual, drift), shrinkage, spent)
+    rest, residual, drift = _settled(motion, state, velocity, rest, shrinkage, smooth)
     energy, least = motion.strained(state, rest, shrinkage, with_energy)
     if least <= 0:
         raise Unstable(
@@ -148,6 +141,26 @@ def settle(
         released = motion.sector.copies * (before - after)
     whole = motion.sector.whole(motion.surface(state))
     return State(whole, shrinkage, residual, drift, motion.steps, least, energy, rest, released)
+
+
+def _settled(
+    motion: Motion,
+    state: Fixed,
+    velocity: Singles,
+    rest: Floats,
+    shrinkage: float,
+    smooth: Callable[[Fixed], bool] | None,
+) -> tuple[Floats, float, float]:
+    """Settle, see `settle`; return rest volumes, residual and drift."""
+    settings = motion.settings
+    rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
+    stays = smooth is not None and spent < settings.settle_steps and smooth(state)
+    if stays and _leaves(motion, state, velocity, rest, shrinkage):
+        rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage)
+        stays = False
+    if shrinkage <= settings.start or stays or residual > settings.residual or drift > settings.drift:
+        return rest, residual, drift
+    return _to_the_end(motion, state, velocity, (rest, residual, drift), shrinkage, spent)
 
 
 def _to_the_end(

@@ -20,8 +20,8 @@ from solver.dehydration.kernel import (
     reweigh,
     stiffness_bounds,
 )
-from solver.dehydration.kernel.bounds import split_bounds
-from solver.dehydration.kernel.coupled import COMMON, RELATIVE
+from solver.dehydration.kernel.bounds import nodal_sums, split_bounds
+from solver.dehydration.kernel.coupled import COMMON, RELATIVE, columns_of
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.strips import BOTTOM, TOP
 
@@ -45,7 +45,7 @@ def thin(rng, columns=(4, 5), depth=0.05):
 
 def shared(rng, **words):
     mesh, tops = thin(rng, **words)
-    layout = build_layout(**mesh, tops=tops, safety=SAFETY)
+    layout = build_layout(**mesh, safety=SAFETY)
     assert sorted(layout.tops) == list(tops)
     return layout, mesh
 
@@ -101,12 +101,13 @@ def test_a_step_is_that_of_the_masses():
 def test_a_unit_step_is_stable_and_the_skin_is_lighter():
     rng = np.random.default_rng(22)
     layout, mesh = shared(rng)
-    alone = build_layout(**mesh, safety=SAFETY)
-    assert not len(alone.tops)
+    given = mesh["is_exocarp"], mesh["mu"], mesh["kappa"]
+    bounds = stiffness_bounds(layout, layout.fresh, *given, even_crushed=True)[0]
+    alone = nodal_sums(layout.connectivity, SAFETY * bounds / 4, layout.nodes)
     lift = np.zeros(layout.nodes)
     for level in (0, 1, 2):
         lift[layout.tops - level] = 1.0
-    assert lift @ dense(layout) @ lift < 0.5 * (lift * alone.mass).sum()
+    assert lift @ dense(layout) @ lift < 0.5 * (lift * alone).sum()
     start, _ = deformed(layout, rng, 1e-4, 1.0)
     state, velocity = start.copy(), np.zeros(start.shape, np.float32)
     march(layout, state, velocity, 2000, theta=(1.0, 1.0), damping=0.0)
@@ -115,9 +116,19 @@ def test_a_unit_step_is_stable_and_the_skin_is_lighter():
 
 def test_thick_skins_share_nothing():
     mesh, tops = thin(np.random.default_rng(23), depth=0.3)
-    layout = build_layout(**mesh, tops=tops)
-    assert not len(layout.tops)
-    assert np.array_equal(layout.mass, build_layout(**mesh).mass)
+    assert not len(build_layout(**mesh).tops)
+    assert len(columns_of(mesh["connectivity"], mesh["is_exocarp"])) == len(tops)
+
+
+def test_only_columns_of_three_nodes_in_a_row_share():
+    mesh, tops = thin(np.random.default_rng(23))
+    connect, skin = mesh["connectivity"], mesh["is_exocarp"]
+    assert np.array_equal(columns_of(connect, skin), tops)
+    assert not len(columns_of(np.random.default_rng(1).permutation(connect.max() + 1)[connect], skin))
+    assert not len(columns_of(connect, np.ones_like(skin)))
+    assert not len(columns_of(connect, np.zeros_like(skin)))
+    single = block_mesh(np.random.default_rng(2), exocarp=1)
+    assert not len(columns_of(single["connectivity"], single["is_exocarp"]))
 
 
 def test_masses_taken_anew_are_those_of_the_fresh_mesh_until_it_deforms():

@@ -17,21 +17,15 @@ from solver.dehydration.kernel.strips import GROUP
 from solver.dehydration.params import DehydrationParams
 
 
-def grooved(least: float = -2.0, safety: float = 4.0, clearance: float = 0.05, te: float | None = None):
-    """A fruit's layout, its skin, and its nodes where a groove has closed, as far as y > least.
-
-    te: of a skin whose columns share their masses.
-    """
-    mesh = build_mesh(DehydrationParams.parse({"te": te or 0.1}), 16, np.linspace(0, 1, 4))
+def grooved(least: float = -2.0, safety: float = 4.0, clearance: float = 0.05, te: float = 0.1):
+    """A fruit's layout, its skin, and its nodes where a groove has closed, as far as y > least."""
+    mesh = build_mesh(DehydrationParams.parse({"te": te}), 16, np.linspace(0, 1, 4))
     depth = mesh.depth.copy()
     depth[-3:] = 1
     groove = np.exp(-((mesh.rays[:, 0] / 0.15) ** 2)) * (mesh.rays[:, 1] > least)
     where = mesh.positions * (1 - 0.5 * groove[:, None] * depth[None, :] ** 2).reshape(-1, 1)
     mu = np.where(mesh.is_exocarp, 10.0, 1.0)
-    layout = build_layout(
-        mesh.positions, mesh.connectivity, mesh.is_exocarp, mu, 30 * mu, mesh.fixed,
-        safety=safety, tops=mesh.surface_nodes if te else (),
-    )  # fmt: skip
+    layout = build_layout(mesh.positions, mesh.connectivity, mesh.is_exocarp, mu, 30 * mu, mesh.fixed, safety=safety)
     return layout, make_skin(layout, mesh.surface_nodes, mesh.sphere.quads, clearance), where
 
 
@@ -46,7 +40,7 @@ def test_the_fruit_gets_what_contact_has_changed(given: tuple[float, ...], steps
     skin = march(layout, state, velocity, 1, skin=skin, **words)
     march(layout, alone, quiet, 1, **words)
     counts, looked = skin.contact.counts, skin.contact.reads[: skin.contact.counts[READS]]
-    assert counts[HITS] > 20
+    assert counts[HITS] > 15
     assert bool(counts[HELD] or 4 * counts[HITS] > counts[READS]) is many
     assert counts[HELD] or (skin.contact.hit_values[: counts[HITS], 1] > 0).sum() > 10
     assert np.array_equal(velocity[skin.rows[looked], :3], skin.velocity[looked, :3])

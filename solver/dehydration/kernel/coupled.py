@@ -24,14 +24,14 @@ import numpy as np
 from numba import njit
 
 from solver.dehydration.kernel.bounds import nodal_sums
-from solver.dehydration.kernel.strips import BOTTOM, GROUP
+from solver.dehydration.kernel.strips import BOTTOM, GROUP, TOP
 
 from ...arrays import Bools, Floats, Ints, Ints32, Singles
 
 if TYPE_CHECKING:
     from solver.dehydration.kernel.layout import Layout
 
-__all__ = ["Weights", "are_alike", "held_outside", "mix", "momentum", "pays", "weights"]
+__all__ = ["Weights", "are_alike", "columns_of", "held_outside", "mix", "momentum", "pays", "weights"]
 
 OPTIONS: Any = {"error_model": "numpy", "forceinline": True}
 """No cache of their own: see `skin`."""
@@ -52,6 +52,16 @@ class Weights(NamedTuple):
     inverse_mass: Singles
     pull: Floats
     spread: Singles
+
+
+def columns_of(connectivity: Ints, is_exocarp: Bools) -> Ints:
+    """Outer nodes of a skin's columns if those are of three nodes in a row each, else none."""
+    low, high = connectivity[is_exocarp][:, BOTTOM].ravel(), connectivity[is_exocarp][:, TOP].ravel()
+    outer = np.setdiff1d(high, low)
+    inner = np.setdiff1d(low, high)
+    if np.array_equal(high, low + 1) and np.array_equal(outer, inner + 2):
+        return outer
+    return outer[:0]
 
 
 def pays(bounds: Floats, is_exocarp: Bools) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, DTypeLike
 
 from solver.dehydration.kernel.algebra import CORE_PLANES, EXOCARP_PLANES, ONE_POINT_PLANES
 from solver.dehydration.kernel.bounds import split_bounds
-from solver.dehydration.kernel.coupled import pays, weights
+from solver.dehydration.kernel.coupled import columns_of, pays, weights
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.fixed_point import positions as positions_of
 from solver.dehydration.kernel.masses import largest_stiffness
@@ -185,7 +185,6 @@ def build_layout(
     one_point: bool = True,
     full_levels: int = 0,
     mirrored: ArrayLike = (),
-    tops: ArrayLike = (),
 ) -> Layout:
     """Prepare a mesh for `march`.
 
@@ -194,34 +193,26 @@ def build_layout(
     fixed: (nn,) nodes that never move (the stone). safety: factor on the scaled masses against stiffening while the
     fruit deforms; the critical time step is at least sqrt(safety) at rest and a unit step is marched. Swelling to
     theta > 1 stiffens by theta: multiply safety by it. one_point: prepare the one-point core element as well.
-    full_levels: see `Layout`. mirrored: numbers 3 node + axis of coordinates that stay 0. tops: outer nodes of a skin
-    of two layers whose columns are three nodes in a row; they share their masses if the skin is thin.
+    full_levels: see `Layout`. mirrored: numbers 3 node + axis of coordinates that stay 0. A thin skin of two layers
+    whose columns are three nodes in a row shares its masses, see `coupled`.
 
     Raises ValueError with what to change for inputs that are not a mesh.
     """
     corners_at, connect, skin, shear, bulk, held = _checked(positions, connectivity, is_exocarp, mu, kappa, fixed)
-    nodes = len(corners_at)
-    strips: Strips = build_strips(connect, skin)
+    nodes, strips = len(corners_at), build_strips(connect, skin)
     if strips.faces.size * ROW >= 2**31 or nodes * 4 >= 2**31:
         raise ValueError(f"{len(connect)} elements are too many for 32-bit offsets")
 
-    # Metric and masses come from the positions as the kernel holds them, so that the fresh state is free of stress.
+    # Metric and masses are of positions as the kernel holds them, so that the fresh state is free of stress.
     fresh = aligned_zeros((nodes, 4), np.int32)
     place(fresh, corners_at)
     corners = positions_of(fresh)[connect]
-
     refuse_inverted(corners)
-    bounds = np.zeros((3, len(connect)))
-    bounds[0] = _bounds(connect, corners, skin, shear, bulk)
-    outer = np.asarray(tops, np.int64)
-    if len(outer):
-        bounds[1:] = split_bounds(fresh, connect, skin, shear, bulk, -np.inf)
-        outer = outer if pays(bounds, skin) else outer[:0]
     core_planes, single_planes, exocarp_planes = _planes(strips, corners, shear, bulk, one_point)
     row_start, rows = assembly_rows(strips, nodes)
+    bounds, outer = _bounds(fresh, connect, corners, skin, shear, bulk)
     groups = group_order(row_start, rows, strips, get_num_threads())
-    in_turn = _in_turn(outer, groups)
-    weighed = weights(connect, skin, held, in_turn, bounds, safety)
+    tops = _in_turn(outer, groups)
     return Layout(
         nodes=nodes,
         elements=len(connect),
@@ -233,24 +224,31 @@ def build_layout(
         row_start=aligned_copy(row_start, np.int32),
         rows=aligned_copy(ROW * rows, np.int32),
         groups=aligned_copy(groups, np.int32),
-        tops=in_turn,
+        tops=tops,
         core_elements=np.where(strips.core_real, strips.core, -1),
         exocarp_elements=np.where(strips.exocarp_real, strips.exocarp, -1),
         connectivity=connect,
         fresh=fresh,
-        **weighed._asdict(),
+        **weights(connect, skin, held, tops, bounds, safety)._asdict(),
         full_levels=full_levels,
         planes=_places(mirrored),
     )
 
 
-def _bounds(connect: Ints, corners: Floats, skin: Bools, shear: Floats, bulk: Floats) -> Floats:
-    """Upper bounds (ne,) of the elements' largest stiffness, whichever way the core is integrated."""
-    bounds = np.empty(len(connect))
+def _bounds(
+    fresh: Ints32, connect: Ints, corners: Floats, skin: Bools, shear: Floats, bulk: Floats
+) -> tuple[Floats, Ints]:
+    """Upper bounds (3, ne) as of `reweigh.stiffness_bounds`, whichever way the core is integrated, and the outer nodes
+    of columns that share their masses.
+    """
+    bounds = np.zeros((3, len(connect)))
     for exocarp in (False, True):
         chosen = skin == exocarp
-        bounds[chosen] = largest_stiffness(corners[chosen], shear[chosen], bulk[chosen], exocarp)
-    return bounds
+        bounds[0, chosen] = largest_stiffness(corners[chosen], shear[chosen], bulk[chosen], exocarp)
+    tops = columns_of(connect, skin)
+    if len(tops):
+        bounds[1:] = split_bounds(fresh, connect, skin, shear, bulk, -np.inf)
+    return bounds, tops if len(tops) and pays(bounds, skin) else tops[:0]
 
 
 def _in_turn(tops: Ints, groups: Ints) -> Ints32:
