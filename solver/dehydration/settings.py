@@ -114,6 +114,8 @@ _STIFFER = 2.0
 _FIRST_LAYER, _GROWTH = 0.08, 1.3
 #: Wall seconds per element and step on one core, for estimates only.
 _SECONDS_PER_ELEMENT_STEP = 5e-8
+#: Steps that a stage settles for, by and large (at the same reference), for estimates only.
+_SETTLING_STEPS = 3000
 #: Steps after which most looked-up shapes are in balance, for estimates only.
 _RELAXING_STEPS = 1500
 #: Seconds until compiled kernels are loaded and the mesh is made.
@@ -211,9 +213,9 @@ def expected_cost(params: DehydrationParams, need: Need) -> Cost:
     if need.start is not None:
         return _whole_cost(settings, _RELAXING_STEPS)
     rungs = [rung for rung in settings.rungs if settings.start < rung < last + 1e-9]
-    # by and large they settle for an eighteenth of the steps they may take
     states = len(rungs) + sum(all(abs(stage - rung) > 1e-9 for rung in rungs) for stage in need.stages)
-    steps = max(last - settings.start, 0.0) / settings.pace + settings.settle_steps / 18 * states
+    settling = _SETTLING_STEPS * settings.n / _STEPS_N * states
+    steps = max(last - settings.start, 0.0) / settings.pace + settling
     return _whole_cost(settings, steps)
 
 

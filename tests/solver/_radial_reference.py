@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BarycentricInterpolator
 
-from solver.dehydration.fresh.closed_form import sphere_radius
-
 Floats = NDArray[np.float64]
+
+#: Increments from the fresh shape.
+_LED = 8
 
 
 def _chebyshev(count: int, low: float, high: float) -> tuple[Floats, Floats]:
@@ -30,7 +31,8 @@ def radial_reference(
     theta: float, stone: float, thickness: float, gamma: float, kappa_ratio: float, count: int = 24
 ) -> Callable[[Floats], Floats]:
     """Return r(R) of a core of radius 1 with mu = 1 and Fd = theta I in a skin of `thickness` and mu = gamma."""
-    layers = [(*_chebyshev(count, stone, 1.0), theta, 1.0), (*_chebyshev(count, 1.0, 1.0 + thickness), 1.0, gamma)]
+    core, skin = _chebyshev(count, stone, 1.0), _chebyshev(count, 1.0, 1.0 + thickness)
+    layers = [(*core, theta, 1.0), (*skin, 1.0, gamma)]
 
     def stresses(radius: Floats, layer: tuple[Floats, Floats, float, float]) -> tuple[Floats, Floats]:
         fresh, derivative, t, mu = layer
@@ -50,23 +52,29 @@ def radial_reference(
         ends = [parts[0, 0] - stone, parts[0, -1] - parts[1, 0], radial[0][-1] - radial[1][0], radial[1][-1]]
         return np.concatenate([*rows, ends])
 
-    unknown = np.concatenate([sphere_radius(layer[0], theta, stone) for layer in layers])
-    unknown[count] = unknown[count - 1]
-    for _ in range(30):
-        jacobian = np.stack([residual(unknown + 1e-30j * e).imag / 1e-30 for e in np.eye(2 * count)], axis=1)
-        step = np.linalg.solve(jacobian, residual(unknown))
-        unknown = unknown - step
-        if np.abs(step).max() < 1e-13:
-            break
-    else:
-        raise RuntimeError("the radial reference did not converge")
-    core, skin = (BarycentricInterpolator(layer[0], r) for layer, r in zip(layers, unknown.reshape(2, -1), strict=True))
+    unknown = np.concatenate([core[0], skin[0]])
+    # a stiff skin stays far from the incompressible shape: it is led there from the fresh one
+    for led in np.linspace(1.0, theta, _LED + 1)[1:]:
+        layers[0] = (*core, led, 1.0)
+        last = np.inf
+        for _ in range(60):
+            jacobian = np.stack([residual(unknown + 1e-30j * e).imag / 1e-30 for e in np.eye(2 * count)], axis=1)
+            step = np.linalg.solve(jacobian, residual(unknown))
+            unknown, size = unknown - step, float(np.abs(step).max())
+            if size < 1e-13 or (size < 1e-10 and size > last / 2):
+                break
+            last = size
+        else:
+            raise RuntimeError("the radial reference did not converge")
+    within, outside = (
+        BarycentricInterpolator(layer[0], r) for layer, r in zip(layers, unknown.reshape(2, -1), strict=True)
+    )
 
     def radius_at(fresh: Floats) -> Floats:
         at = np.asarray(fresh, dtype=float)
         inside = at <= 1 + 1e-12
         result = np.empty_like(at)
-        result[inside], result[~inside] = core(at[inside]), skin(at[~inside])
+        result[inside], result[~inside] = within(at[inside]), outside(at[~inside])
         return result
 
     return radius_at

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from solver.contract import Context
+from solver.contract import Context, Need
+from solver.dehydration import SOLVER
 from solver.dehydration.fresh.mesh import build_mesh
 from solver.dehydration.kernel import (
     build_layout,
@@ -23,6 +24,8 @@ from solver.dehydration.kernel import (
 from solver.dehydration.params import DehydrationParams
 from solver.dehydration.path import Path
 from solver.dehydration.settings import choose
+
+from ._radial_reference import radial_reference
 
 KAPPA, WANTED, THETA = 30.0, 1000.0, 0.9
 
@@ -116,3 +119,31 @@ def test_a_whole_fruit_is_as_stiff_in_volume_as_it_says(shrinkage: float, start:
         errors.append(abs(np.linalg.norm(state.surface, axis=1).mean() / outer - 1))
     assert errors[1] < 2e-4 * max(1, abs(shrinkage) / 0.05)
     assert errors[1] < errors[0] / 5
+
+
+@pytest.mark.parametrize(("te", "gamma", "off"), [(0.04, 10.0, 0.002), (0.2, 100.0, 0.016), (0.2, 1000.0, 0.005)])
+def test_flesh_under_a_stiff_skin_is_as_stiff_as_it_is_meant_to_be(te, gamma, off):
+    """A skin that hardly gives way pulls the flesh apart: marched at 30 alone it stayed three times as large as it is.
+
+    The residual is over the skin's forces, so that stiff skins are the least exact.
+    """
+    params = SOLVER.parse({"te": te, "gamma": gamma, "mirrors": "xyz", "imperfection": 0})
+    need = SOLVER.settle(Need(stages=(0.02,), quality="preview", fields=("mean_radius",)))
+    run = SOLVER.solve(params, need)
+    radius = radial_reference(0.98, 0.4, te, gamma, 1000.0)(np.array([1 + te]))[0]
+    assert run["converged"].values.all()
+    assert 1 + te - run["mean_radius"].values[0] == pytest.approx(1 + te - radius, rel=off)
+
+
+@pytest.mark.parametrize("quality", ["preview", "default"])
+def test_next_to_no_shrinkage_settles(quality):
+    """Its forces are near round-off; that is no lack of balance."""
+    params = SOLVER.parse({"mirrors": "xyz", "imperfection": 0})
+    need = SOLVER.settle(Need(stages=(0.0001, 0.001), quality=quality, fields=("mean_radius",)))
+    run = SOLVER.solve(params, need)
+    assert run["converged"].values.all()
+    assert run["iterations"].values[-1] < 5000
+    te = params.exocarp_thickness
+    for s, radius in zip((0.0001, 0.001), run["mean_radius"].values, strict=True):
+        exact = radial_reference(1 - s, 0.4, te, params.modulus_ratio, 1000.0)(np.array([1 + te]))[0]
+        assert 1 + te - radius == pytest.approx(1 + te - exact, rel=0.02)

@@ -81,3 +81,13 @@ def test_valleys_are_the_labels_of_an_image_that_is_closed_by_hand(seed):
         meet(labels[-1, column], labels[-1, column + n])
     assert count > 10
     assert _valleys(field, level) == len(set(name[1:]))
+
+
+@pytest.mark.parametrize(("depth", "count"), [(0.05, 0), (0.5, 20)])
+def test_bumps_of_a_skin_that_has_not_buckled_are_no_buckles(setting, depth, count):
+    """Dimples as deep as a part of the skin's thickness."""
+    surface, fresh, *_, d = setting
+    bumps = dimples(d, 20, 0.25)
+    found = surface.describe(fresh + depth * 0.04 * bumps[:, None] * d)
+    assert found.buckle_count == count
+    assert found.dominant_degree > 3

@@ -99,3 +99,14 @@ def test_rungs_stand_apart_where_that_was_tried(te, gamma, quality, wide):
     settings = choose(SOLVER.parse({"te": te, "gamma": gamma}), quality, 0.3)
     assert (0.15 in settings.rungs) is not wide
     assert {0.05, 0.1, 0.2, 0.3} <= set(settings.rungs)
+
+
+def test_a_stage_has_the_mesh_that_it_has_beside_others():
+    """Also where wrinkles take more elements than the quality has; where they would be refused it has the quality's."""
+    thin = SOLVER.parse({"te": 0.012})
+    smooth, wrinkled = (choose(thin, "preview", last).n for last in (0.01, 0.3))
+    assert smooth == wrinkled > choose(SOLVER.parse({"te": 0.02}), "preview").n
+    thinnest = SOLVER.parse({"te": 0.002})
+    assert choose(thinnest, "preview", 0.01).n == 48
+    with pytest.raises(InvalidInput, match="more than 2,500,000"):
+        choose(thinnest, "preview", 0.3)
