@@ -40,7 +40,7 @@ def test_the_fruit_gets_what_contact_has_changed(given: tuple[float, ...], steps
     skin = march(layout, state, velocity, 1, skin=skin, **words)
     march(layout, alone, quiet, 1, **words)
     counts, looked = skin.contact.counts, skin.contact.reads[: skin.contact.counts[READS]]
-    assert counts[HITS] > 15
+    assert counts[HITS] > 15  # 20: the lighter skin is pushed away by the first
     assert bool(counts[HELD] or 4 * counts[HITS] > counts[READS]) is many
     assert counts[HELD] or (skin.contact.hit_values[: counts[HITS], 1] > 0).sum() > 10
     assert np.array_equal(velocity[skin.rows[looked], :3], skin.velocity[looked, :3])
