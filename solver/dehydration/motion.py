@@ -154,12 +154,16 @@ class Motion:
 
     @property
     def masses(self) -> Masses:
-        """The masses and how they follow: what comes next depends on them as on state and velocity."""
+        """The masses and how they follow: what comes next depends on them as on state and velocity.
+
+        Who sets them goes on from another state, and what may touch is looked for anew there.
+        """
         return self.layout, self._weighed, self._closely
 
     @masses.setter
     def masses(self, masses: Masses) -> None:
         self.layout, self._weighed, self._closely = masses
+        forget(self._skin, self.layout)
 
     def _follow(self, state: Fixed, velocity: Singles) -> int:
         """Take the masses anew if nodes have come far since the last time; return how many steps may be made now."""
@@ -186,7 +190,11 @@ class Motion:
         b: float,
         damping: float,
     ) -> Floats:
-        """March from shrinkage a to b under rest volumes `rest`, and return those that go with the new pressures."""
+        """March from shrinkage a to b under rest volumes `rest`, and return those that go with the new pressures.
+
+        What may touch is looked for anew, so that no earlier steps matter.
+        """
+        forget(self._skin, self.layout)
         self.run(state, velocity, rest, count, a, b, damping)
         return self._followed(state, rest, count, b, damping)
 
@@ -232,7 +240,7 @@ class Motion:
     ) -> None:
         """March from shrinkage a to b under rest volumes `rest`; state and velocity change in place.
 
-        Masses follow the deformation on the way. What leaves the finite is taken again, and masses follow closely from
+        Masses follow the deformation on the way, and so does what may touch, from the steps before. What leaves the finite is taken again, and masses follow closely from
         then on: a thick and very stiff skin that snaps through outruns them.
 
         Raises:
@@ -260,7 +268,7 @@ class Motion:
         b: float,
         damping: float,
     ) -> None:
-        forget(self._skin, self.layout)
+        weigh(self._skin, self.layout)
         for begin, end, steps in self.drive.pieces(a, b, count):
             middle = (begin + end) / 2
             self.drive.lead(state, middle)
@@ -315,12 +323,16 @@ class Motion:
         theta, settings = 1 - shrinkage, self.settings
         loaded = self.drive.loaded(self.layout, shrinkage)
         if not with_energy:
-            return None, float(least_ratios(loaded, state, theta).min())
+            return None, self.least_ratio(state, shrinkage)
         sheared = element_report(without_bulk(loaded), state, theta, one_point=True)
         dilatation = dilatations(self._ready(shrinkage, rest), state, theta)
         share = self._march_kappa_ratio / settings.kappa_ratio
         energy = float((sheared.energy + pressure_energy(loaded, dilatation, theta, share)).sum())
         return self.sector.copies * energy, float(sheared.least_ratio.min())
+
+    def least_ratio(self, state: Fixed, shrinkage: float) -> float:
+        """Return the least J/Jd of all integration points."""
+        return float(least_ratios(self.drive.loaded(self.layout, shrinkage), state, 1 - shrinkage).min())
 
     def residual(self, state: Fixed, rest: Floats, shrinkage: float, damping: float) -> float:
         """Return the out-of-balance force, contact included: what one step from rest does to the momentum.

@@ -32,7 +32,7 @@ _NEAR = 3.0
 _SHARE = 0.5
 
 #: Likewise in a swing, at each look and where all stands still: a swing goes far, and its pressures with it.
-_SHARE_SWINGING, _SHARE_STILL = 0.1, 0.2
+_SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 
 #: Share of the steps that a stage may settle for after which it swings no more: what each swing throws out of balance,
 #: as rest volumes hardly hold it, comes to rest when eased while they follow.
@@ -41,18 +41,18 @@ _SWINGING = 0.75
 #: Damping of a turn of easing over a swing's, its parts, after each of which rest volumes follow, and what of the
 #: residual is left where it is worth another. A swing goes past the end of ways so soft that a calmed state creeps
 #: along them: thin skins at default swung to and fro until their steps were spent.
-_EASING, _EASING_PARTS, _EASED = 20.0, 2, 0.7
+_EASING, _EASING_PARTS, _EASED = 10.0, 2, 0.7
 
 #: Turns of calming alone in which a state comes to rest under new rest volumes, before it swings again.
 _CALM_TURNS = 3
 
 #: Calm steps between two looks at residual and drift, after a swing and of a smooth fruit, which creeps to its radius.
-_CALM_LOOK, _SMOOTH_LOOK = 100, 200
+_CALM_LOOK, _SMOOTH_LOOK = 50, 200
 
-#: Part of its strain energy that a turn gives up where it is one of the last, and how many of those follow each other.
-#: Ways can be so soft that forces balance in the middle of one: eighths at te = 0.04 that were left where they balanced
-#: would have gone on, most of them by a third of their roughness.
-_GIVEN_UP, _LAST_TURNS = 1e-3, 1
+#: Part of its strain energy that a turn gives up where it is the last. Ways can be so soft that forces balance in the
+#: middle of one: eighths at te = 0.04 that were left where they balanced would have gone on, most of them by a third of
+#: their roughness.
+_GIVEN_UP = 1e-3
 
 #: Swings that a state is left to itself to show whether it is stable, and the rms way of the surface [te] after which
 #: it was not: of what is seen to be smooth, and of what may have buckles, whose soft ways are longer. 1 % past the
@@ -108,8 +108,8 @@ def settle(
     a little. So on, until they are off (rms) by no more than forces may be.
 
     What balances may still be in the middle of a soft way. So it goes on, turn by turn, each a swing and what it takes
-    to balance after it, until one gives up next to no energy. A turn that does not balance in the steps that are left
-    is taken back.
+    to balance after it, until one gives up next to no energy. A turn that does not balance in the steps that are left,
+    or turns elements inside out, is taken back.
 
     smooth: whether a state at rest may have no buckles yet. Such a one is left to swing, and where it goes elsewhere
     settles there: a smooth fruit past its onset balances and is not stable, but buckles grow from its bumps, at first
@@ -175,8 +175,8 @@ def _to_the_end(
 
     found: those that it has. spent: steps that it has taken to balance.
     """
-    settings, last = motion.settings, 0
-    while last < _LAST_TURNS and spent + settings.swing_steps < settings.settle_steps:
+    settings, begun, now = motion.settings, np.inf, 0.0
+    while begun - now > _GIVEN_UP * now and spent + settings.swing_steps < settings.settle_steps:
         before, masses = state.copy(), motion.masses
         try:
             rest = _swung(motion, state, velocity, found[0], shrinkage)
@@ -184,14 +184,14 @@ def _to_the_end(
             rest, spent, residual, drift = _come_to_rest(motion, state, velocity, rest, shrinkage, spent)
         except Unstable:
             residual, drift = np.inf, np.inf
-        if residual > settings.residual or drift > settings.drift:
+        balances = residual <= settings.residual and drift <= settings.drift
+        if not balances or motion.least_ratio(state, shrinkage) <= 0:
             state[:], motion.masses = before, masses
             velocity[:] = 0
             break
         found = rest, residual, drift
         # under the same rest volumes: energies under others do not compare
         begun, now = (motion.marched_energy(each, rest, shrinkage) for each in (before, state))
-        last = last + 1 if begun - now <= _GIVEN_UP * now else 0
     return found
 
 
@@ -214,15 +214,7 @@ def _come_to_rest(
             rest = _swung(motion, state, velocity, rest, shrinkage)
         if late or calm == 0:
             spent += settings.swing_steps
-        rested, residual, drift = 0, np.inf, np.inf
-        while (residual > settings.residual or drift > settings.drift) and rested < settings.calm_steps:
-            surface = motion.surface(state)
-            # rest volumes stay: under some that go on following, forces have no potential and hardly balance
-            count = min(_CALM_LOOK if swings else _SMOOTH_LOOK, max(20, motion.slice))
-            motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.calm_damping)
-            rested += count
-            residual = motion.residual(state, rest, shrinkage, settings.calm_damping)
-            drift = _way(motion, state, surface) / count * _REST_STEPS
+        rested, residual, drift = _calmed(motion, state, velocity, rest, shrinkage)
         spent += rested
         lag = motion.rests(state, rest, shrinkage) / rest
         behind = float(np.sqrt(np.mean(np.square(lag - 1))))
@@ -237,6 +229,35 @@ def _come_to_rest(
         # under new rest volumes what balances stays where it is, or nearly: to swing would throw it far
         calm = _CALM_TURNS if balanced else max(calm - 1, 0)
     return rest, spent, max(residual, behind), drift
+
+
+def _calmed(
+    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float
+) -> tuple[int, float, float]:
+    """Calm the state until it balances; return the steps that took, the residual and the drift.
+
+    What rings is gone after two or three looks. What drifts on then hardly slows down, and a swing leads it farther: a
+    state that would not be at rest in time is given back. Rest volumes stay: under some that go on following, forces
+    have no potential and hardly balance.
+    """
+    settings = motion.settings
+    swings = shrinkage > settings.start
+    rested, residual, drift, keeps = 0, np.inf, np.inf, False
+    while (residual > settings.residual or drift > settings.drift) and rested < settings.calm_steps and not keeps:
+        surface, before = motion.surface(state), drift
+        count = min(_CALM_LOOK if swings else _SMOOTH_LOOK, max(20, motion.slice))
+        motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.calm_damping)
+        rested += count
+        residual = motion.residual(state, rest, shrinkage, settings.calm_damping)
+        drift = _way(motion, state, surface) / count * _REST_STEPS
+        last = _foreseen(drift, before, (settings.calm_steps - rested) / count)
+        keeps = swings and min(drift, last) > settings.drift
+    return rested, residual, drift
+
+
+def _foreseen(drift: float, before: float, looks: float) -> float:
+    """Return the drift after so many more looks, if each leaves as much of it as the last did."""
+    return drift * (drift / before) ** looks if before else drift
 
 
 def _way(motion: Motion, state: Fixed, surface: Floats) -> float:

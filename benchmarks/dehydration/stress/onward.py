@@ -89,11 +89,7 @@ def _onward(motion: Motion, state: NDArray[np.int32], found: settle.State) -> Ro
     here = motion.surface(on)
     while motion.steps - steps < _PART * settings.settle_steps:
         rest = settle._swung(motion, on, speed, rest, s)
-        for _ in range(2):
-            before = motion.surface(on)
-            motion.run(on, speed, rest, settle._CALM_LOOK, s, s, settings.calm_damping)
-        drift = settle._way(motion, on, before)
-        residual = motion.residual(on, rest, s, settings.calm_damping)
+        _, residual, drift = settle._calmed(motion, on, speed, rest, s)
         rest = settle._followed(motion, on, rest, s, settle._SHARE)
     there = motion.surface(on)
     rough, rougher = (float(np.linalg.norm(surface, axis=1).std()) for surface in (here, there))
