@@ -240,8 +240,9 @@ class Motion:
     ) -> None:
         """March from shrinkage a to b under rest volumes `rest`; state and velocity change in place.
 
-        Masses follow the deformation on the way, and so does what may touch, from the steps before. What leaves the finite is taken again, and masses follow closely from
-        then on: a thick and very stiff skin that snaps through outruns them.
+        Masses follow the deformation on the way; the list of what may touch goes on from the steps before. What leaves
+        the finite is taken again, and masses follow closely from then on: a thick and very stiff skin that snaps
+        through outruns them.
 
         Raises:
             Unstable: it left the finite nevertheless; state and velocity are those of then.

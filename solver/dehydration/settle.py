@@ -41,7 +41,7 @@ _SWINGING = 0.75
 #: Damping of a turn of easing over a swing's, its parts, after each of which rest volumes follow, and what of the
 #: residual is left where it is worth another. A swing goes past the end of ways so soft that a calmed state creeps
 #: along them: thin skins at default swung to and fro until their steps were spent.
-_EASING, _EASING_PARTS, _EASED = 10.0, 2, 0.7
+_EASING, _EASING_PARTS, _EASED = 20.0, 2, 0.7
 
 #: Turns of calming alone in which a state comes to rest under new rest volumes, before it swings again.
 _CALM_TURNS = 3

@@ -20,7 +20,7 @@ from solver.dehydration.kernel import (
     reweigh,
     stiffness_bounds,
 )
-from solver.dehydration.kernel.bounds import nodal_sums, split_bounds
+from solver.dehydration.kernel.bounds import element_bounds, nodal_sums
 from solver.dehydration.kernel.coupled import COMMON, RELATIVE, columns_of
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.strips import BOTTOM, TOP
@@ -65,7 +65,7 @@ def test_split_bounds_are_safe(kappa, flat):
         state = np.zeros((8, 4), np.int32)
         place(state, fresh)
         given = np.arange(8)[None], np.ones(1, bool), np.ones(1), np.full(1, kappa), -np.inf
-        common, relative = split_bounds(state, *given)[:, 0]
+        common, relative = element_bounds(state, *given, split=True)[1:, 0]
         exact = stiffness(positions(state), "exocarp", 1.0, kappa).reshape(8, 3, 8, 3)
         turned = np.zeros((8, 8))
         for k, (low, high) in enumerate(zip(BOTTOM, TOP, strict=True)):

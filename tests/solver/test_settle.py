@@ -19,7 +19,7 @@ from solver.dehydration.settle import settle
 SOLVER = registry.get("dehydration")
 PARAMS = SOLVER.parse({"mirrors": "xyz"})
 SETTINGS = choose(PARAMS, "preview")
-EASING = 10 * SETTINGS.swing_damping
+EASING = 20 * SETTINGS.swing_damping
 
 
 class Told:

@@ -14,7 +14,7 @@ from ...arrays import Bools, Floats, Ints, Ints32
 from .fixed_point import QUANTUM
 from .metric import SLOPES, quadrature
 
-__all__ = ["element_bounds", "nodal_sums", "split_bounds"]
+__all__ = ["element_bounds", "nodal_sums"]
 
 
 @njit(cache=True, error_model="numpy")
@@ -93,6 +93,17 @@ def _largest(l: Floats, b: Floats, volume: float, mu: float, kappa: float) -> fl
     return 0.5 * (total + math.sqrt(max(total * total - 4.0 * bulk * shear, 0.0)))
 
 
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "nsz", "arcp", "contract"})
+def _half(l: Floats, b: Floats, sign: float, part: Floats, slope: Floats) -> None:  # noqa: E741
+    """Fill `part` (4, 4) and `slope` (4, 3), what l and b are of (t + sign b) / sqrt 2 of the ends of zeta's edges."""
+    for a in range(4):
+        for c in range(4):
+            across = l[2 * a, 2 * c + 1] + l[2 * a + 1, 2 * c]
+            part[a, c] = 0.5 * (l[2 * a, 2 * c] + l[2 * a + 1, 2 * c + 1] + sign * across)
+        for i in range(3):
+            slope[a, i] = math.sqrt(0.5) * (b[2 * a + 1, i] + sign * b[2 * a, i])
+
+
 @njit(cache=True, error_model="numpy", parallel=True, fastmath={"reassoc", "nsz", "arcp", "contract"})
 def _bounds(
     state: Ints32,
@@ -103,9 +114,10 @@ def _bounds(
     mu: Floats,
     kappa: Floats,
     least_share: float,
-    bound: Floats,
+    split: bool,
+    bounds: Floats,
 ) -> None:
-    """Fill bound (ne,) of `elements`, by a rule with shape derivatives `slopes` (q, 8, 3)."""
+    """Fill bounds (3, ne) of `elements`, the last two if `split`; slopes (q, 8, 3): the rule's shape derivatives."""
     for place in prange(elements.size):
         e = elements[place]
         x, b, g, l = np.empty((8, 3)), np.zeros((8, 3)), np.empty((8, 3)), np.zeros((8, 8))  # noqa: E741
@@ -113,70 +125,37 @@ def _bounds(
             for i in range(3):
                 x[a, i] = state[connectivity[e, a], i] * QUANTUM
         if not _sound(x, least_share):
-            bound[e] = 0.0
             continue
         volume = _stiffness(x, slopes, weights, g, b, l)
-        bound[e] = _largest(l, b, volume, mu[e], kappa[e])
+        bounds[0, e] = _largest(l, b, volume, mu[e], kappa[e])
+        if split:
+            part, slope = np.empty((4, 4)), np.empty((4, 3))
+            for k in range(2):
+                _half(l, b, 1.0 - 2.0 * k, part, slope)
+                bounds[1 + k, e] = _largest(part, slope, volume, mu[e], kappa[e])
 
 
 def element_bounds(
-    state: Ints32, connectivity: Ints, is_exocarp: Bools, mu: Floats, kappa: Floats, least_share: float
-) -> Floats:
-    """Upper bound (ne,) of each element's largest stiffness at `state` (nodes, 4).
-
-    0 for elements of which a corner Jacobian falls below least_share of the largest (-inf: of none).
-    """
-    bound = np.empty(len(connectivity))
-    for exocarp in (False, True):
-        elements = np.flatnonzero(is_exocarp == exocarp)
-        _bounds(state, connectivity, elements, SLOPES[exocarp], quadrature(exocarp)[1], mu, kappa, least_share, bound)
-    return bound
-
-
-@njit(cache=True, error_model="numpy", parallel=True, fastmath={"reassoc", "nsz", "arcp", "contract"})
-def _split_bounds(
     state: Ints32,
     connectivity: Ints,
-    elements: Ints,
-    slopes: Floats,
-    weights: Floats,
+    is_exocarp: Bools,
     mu: Floats,
     kappa: Floats,
     least_share: float,
-    bounds: Floats,
-) -> None:
-    """Fill bounds (2, ne) of `elements`; arguments as in `_bounds`."""
-    for place in prange(elements.size):
-        e = elements[place]
-        x, b, g, l = np.empty((8, 3)), np.zeros((8, 3)), np.empty((8, 3)), np.zeros((8, 8))  # noqa: E741
-        for a in range(8):
-            for i in range(3):
-                x[a, i] = state[connectivity[e, a], i] * QUANTUM
-        if not _sound(x, least_share):
-            bounds[:, e] = 0.0
-            continue
-        volume = _stiffness(x, slopes, weights, g, b, l)
-        part, slope = np.empty((4, 4)), np.empty((4, 3))
-        for k in range(2):
-            sign = 1.0 - 2.0 * k
-            for a in range(4):
-                for c in range(4):
-                    across = l[2 * a, 2 * c + 1] + l[2 * a + 1, 2 * c]
-                    part[a, c] = 0.5 * (l[2 * a, 2 * c] + l[2 * a + 1, 2 * c + 1] + sign * across)
-                for i in range(3):
-                    slope[a, i] = math.sqrt(0.5) * (b[2 * a + 1, i] + sign * b[2 * a, i])
-            bounds[k, e] = _largest(part, slope, volume, mu[e], kappa[e])
-
-
-def split_bounds(
-    state: Ints32, connectivity: Ints, is_exocarp: Bools, mu: Floats, kappa: Floats, least_share: float
+    *,
+    split: bool,
 ) -> Floats:
-    """Likewise (2, ne) of a skin's elements for motion as one of the ends of its edges along zeta, and for their
-    parting; 0 of other elements.
+    """Upper bounds (3, ne) of each element's largest stiffness at `state` (nodes, 4): on the whole and, of a skin's
+    elements where those are asked for by `split`, of motion as one of the ends of its edges along zeta, and of their
+    parting.
+
+    0 for elements of which a corner Jacobian falls below least_share of the largest (-inf: of none), and elsewhere.
     """
-    bounds = np.zeros((2, len(connectivity)))
-    elements = np.flatnonzero(is_exocarp)
-    _split_bounds(state, connectivity, elements, SLOPES[True], quadrature(True)[1], mu, kappa, least_share, bounds)
+    bounds = np.zeros((3, len(connectivity)))
+    for exocarp in (False, True):
+        elements = np.flatnonzero(is_exocarp == exocarp)
+        rule = SLOPES[exocarp], quadrature(exocarp)[1]
+        _bounds(state, connectivity, elements, *rule, mu, kappa, least_share, split and exocarp, bounds)
     return bounds
 
 

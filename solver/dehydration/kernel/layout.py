@@ -11,7 +11,7 @@ from numba import get_num_threads
 from numpy.typing import ArrayLike, DTypeLike
 
 from solver.dehydration.kernel.algebra import CORE_PLANES, EXOCARP_PLANES, ONE_POINT_PLANES
-from solver.dehydration.kernel.bounds import split_bounds
+from solver.dehydration.kernel.bounds import element_bounds
 from solver.dehydration.kernel.coupled import columns_of, pays, weights
 from solver.dehydration.kernel.fixed_point import place
 from solver.dehydration.kernel.fixed_point import positions as positions_of
@@ -247,7 +247,7 @@ def _bounds(
         bounds[0, chosen] = largest_stiffness(corners[chosen], shear[chosen], bulk[chosen], exocarp)
     tops = columns_of(connect, skin)
     if len(tops):
-        bounds[1:] = split_bounds(fresh, connect, skin, shear, bulk, -np.inf)
+        bounds[1:] = element_bounds(fresh, connect, skin, shear, bulk, -np.inf, split=True)[1:]
     return bounds, tops if len(tops) and pays(bounds, skin) else tops[:0]
 
 

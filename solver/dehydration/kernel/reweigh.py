@@ -10,7 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from solver.dehydration.kernel.bounds import element_bounds, split_bounds
+from solver.dehydration.kernel.bounds import element_bounds
 from solver.dehydration.kernel.coupled import weights
 from solver.dehydration.kernel.layout import Layout
 
@@ -55,6 +55,5 @@ def stiffness_bounds(
     parting (see `coupled`). even_crushed: take it of those as well, as for a fresh mesh, which has slender but no
     inverted ones.
     """
-    given = state, layout.connectivity, is_exocarp, mu, kappa, -np.inf if even_crushed else LEAST_VOLUME
-    split = split_bounds(*given) if len(layout.tops) else np.zeros((2, layout.elements))
-    return np.concatenate([element_bounds(*given)[None], split])
+    least = -np.inf if even_crushed else LEAST_VOLUME
+    return element_bounds(state, layout.connectivity, is_exocarp, mu, kappa, least, split=len(layout.tops) > 0)
