@@ -26,7 +26,7 @@ from ..views.tags import matches
 from . import choices
 from . import fields as jobs_fields
 from .routes import JobId, check_done, stored_job
-from .staged import encode, is_surface
+from .staged import NETCDF, encode, is_surface
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,7 +35,6 @@ __all__ = ["router"]
 
 router = APIRouter(tags=["jobs"])
 
-NETCDF = "application/x-netcdf"
 _NAMES = ("netcdf", *FORMATS, *EXPORTS)
 
 

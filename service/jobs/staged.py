@@ -19,9 +19,9 @@ from ..formats import About, Format
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["encode", "is_surface"]
+__all__ = ["NETCDF", "encode", "is_surface"]
 
-_NETCDF = "application/x-netcdf"
+NETCDF = "application/x-netcdf"
 
 
 def is_surface(run: xr.Dataset, job: Job) -> bool:
@@ -53,7 +53,7 @@ def encode(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> by
         points = fresh.points(*lattice(run.sizes["colatitude"]))
         run["position"] = run["displacement"] + points.astype(run["displacement"].dtype)
     if not is_surface(run, job) or "position" not in run:
-        advice = f"Ask for {_NETCDF}; a job whose need has the field 'position' and no region is a shape."
+        advice = f"Ask for {NETCDF}; a job whose need has the field 'position' and no region is a shape."
         raise NotAcceptable("this result is not a whole surface.", advice=advice)
     axes = vocabulary.axes(job.solver)
     start: Mapping[str, Any] = job.need.get("start") or {}
@@ -76,8 +76,7 @@ def _done(solver: Solver, params: Params) -> tuple[dict[str, float], dict[str, A
     """Return what answers of tables say besides the axes: other numbers, and how the run was done where that is not
     the usual.
     """
-    usual = {name: field.default for name, field in type(params).model_fields.items() if not field.is_required()}
-    full = {**usual, **params.model_dump(mode="json")}
+    full, usual = params.full(), params.usual()
     taken = {field for field, _ in params.axes.values()}
     numbers = {k: float(v) for k, v in full.items() if k not in taken and isinstance(v, int | float)}
     made = {name: full[name] for name in solver.incidental if full[name] != usual.get(name)}
@@ -90,5 +89,5 @@ def _params(solver: Solver, job: Job) -> Params:
     except SolverError:
         raise NotAcceptable(
             f"the result is of version {job.version} of {solver.name}, whose parameters were others.",
-            advice=f"Ask for {_NETCDF}.",
+            advice=f"Ask for {NETCDF}.",
         ) from None

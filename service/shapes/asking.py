@@ -188,21 +188,19 @@ def words_of(solver: Solver, table: ShapeTable, max_resolution: int, tables: Liv
 
     """
     stored.check_version(table.info, solver)
-    described = vocabulary.axes(solver.name)
-    fixed = {k: float(v) for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, int | float)}
+    fixed, made, units = covering.said(solver, table.info)
     texts = {k: v for k, v in table.fixed.items() if k.isidentifier() and isinstance(v, str)}
     # what a table says nothing of is as usual: parameters are written only where they differ
     texts = {**{k: v for k, v in naming.words(solver.params).items() if k not in table.fixed}, **texts}
-    units = {name: described[name].units for name in (*table.axes, *table.info.tied, *fixed) if name in described}
     return Words(
         axes=table.axes,
         fixed=fixed,
         stage=solver.stages.symbol,
         stages=table.reach,
-        units={**units, solver.stages.symbol: solver.stages.units},
+        units=units,
         max_resolution=max_resolution,
         tied=table.info.tied,
-        made=stored.made(table.info, solver),
+        made=made,
         shade=covering.shade(solver, table.info, tables.families(solver)),
         texts=texts,
     )

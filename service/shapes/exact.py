@@ -186,14 +186,14 @@ def _command(asked: Asked, run: Params) -> _Command:
     It names the preset and what was said, and then what the table's runs have besides. What refers to another run, as a
     pattern does, takes a store, which `wizen solve` has none of.
     """
-    wanted = _full(run)
+    wanted = run.full()
     preset, said = asked.found.preset, _said(asked)
     try:
         near = asked.solver.parse(said, preset)
     except SolverError:
         # only with what the table says besides is it a fruit
         preset, said, near = None, {}, asked.solver.parse({})
-    known = _full(near)
+    known = near.full()
     rest = {name: value for name, value in wanted.items() if value != known[name]}
     lacks = tuple(name for name, value in rest.items() if isinstance(value, Mapping))
     # a whole field goes before its entries, which are said by their axes
@@ -204,12 +204,6 @@ def _command(asked: Asked, run: Params) -> _Command:
         if name not in lacks:
             words += ["--set", f"{name}={_written(value)}"]
     return _Command(shlex.join([*words, "--stages", _number(asked.query.stage), "--out", "shape.h5"]), lacks)
-
-
-def _full(params: Params) -> dict[str, Any]:
-    """Return all parameters as JSON values, those too that are written only where they are not as usual."""
-    usual = {name: field.default for name, field in type(params).model_fields.items() if not field.is_required()}
-    return {**usual, **params.model_dump(mode="json")}
 
 
 def _said(asked: Asked) -> dict[str, Any]:

@@ -79,6 +79,15 @@ class Params(BaseModel):
         """Whether a run leaves the surface where it is fresh, so that a result without a position has that one."""
         return False
 
+    @classmethod
+    def usual(cls) -> dict[str, Any]:
+        """Return the defaults of the parameters that have one."""
+        return {name: field.default for name, field in cls.model_fields.items() if not field.is_required()}
+
+    def full(self) -> dict[str, Any]:
+        """Return all parameters as JSON values, those too that are written only where they are not as usual."""
+        return {**self.usual(), **self.model_dump(mode="json")}
+
     def axis(self, name: str) -> float:
         """Return the scalar behind an axis name, e.g. `axis("te")`."""
         field, index = self.axes[name]

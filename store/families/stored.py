@@ -24,8 +24,7 @@ __all__ = ["base", "check_version", "describe", "document", "families", "made", 
 
 def base(solver: Solver) -> Base:
     """Return what questions about shapes of a solver start from."""
-    defaults = {name: field.default for name, field in solver.params.model_fields.items() if not field.is_required()}
-    return Base(solver.name, defaults, solver.incidental, solver.presets)
+    return Base(solver.name, solver.params.usual(), solver.incidental, solver.presets)
 
 
 def families(store: Store, solver: Solver, read: Callable[[str], TableInfo] | None = None) -> Families:

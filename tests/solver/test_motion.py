@@ -91,3 +91,20 @@ def test_masses_that_follow_closely_are_taken_anew_sooner():
         motion._follow(state, velocity)
         found.append(motion.layout is not before)
     assert found == [False, True]
+
+
+def test_who_goes_on_from_another_state_looks_for_pairs_anew():
+    """What was searched where the last steps were stays for the next ones alone."""
+    motion, state, velocity = moving()
+    run(motion, state, velocity)
+    searched = motion._skin.contact.searched.copy()
+    assert np.abs(searched).max() < 2
+    motion.run(state, velocity, motion.rest, 10, 0.06, 0.06, 0.5)
+    assert_array_equal(motion._skin.contact.searched, searched)
+    motion.masses = motion.masses
+    assert motion._skin.contact.searched.min() > 1e6
+    begun = []
+    motion.run = lambda *_: begun.append(motion._skin.contact.searched.min())
+    run(motion, state, velocity)
+    motion.advance(state, velocity, motion.rest, 10, 0.06, 0.06, 0.5)
+    assert begun == [pytest.approx(1e15)] * 2
