@@ -10,6 +10,7 @@ import pytest
 from solver import registry
 from solver.contract import Context, Need, Unstable
 from solver.dehydration import run as run_module
+from solver.dehydration.contact.data import PAIRS
 from solver.dehydration.fresh.closed_form import sphere_radius
 from solver.dehydration.fresh.imperfection import bumps
 from solver.dehydration.path import Path
@@ -261,6 +262,19 @@ def test_stages_do_not_depend_on_what_else_was_asked_for():
     for stages in ((0.1,), (0.06, 0.11)):
         for stage, points in solved(*stages).items():
             np.testing.assert_array_equal(points, many[stage])
+
+
+def test_stages_whose_folds_touch_do_not_depend_on_what_else_was_asked_for():
+    """The list of what may touch goes on from one look to the next of a stage, and from no stage to another."""
+    params = SOLVER.parse({"te": 0.04, "mirrors": "xyz"})
+
+    def at(*stages: float) -> np.ndarray:
+        path = Path(params, choose(params, "preview"), Context())
+        surface = [path.stage(stage, stages[-1]).surface for stage in stages][-1]
+        assert path.motion._skin.contact.counts[PAIRS] > 100
+        return surface
+
+    np.testing.assert_array_equal(at(0.3), at(0.22, 0.26, 0.3))
 
 
 def test_a_smooth_stage_before_the_march_leaves_no_trace_in_it():
