@@ -42,7 +42,7 @@ from .kernel import (
 from .kernel.fixed_point import QUANTUM
 from .kernel.march import SEARCH_EVERY
 from .params import DehydrationParams
-from .settings import MARCH_KAPPA, Settings
+from .settings import Settings
 
 __all__ = ["Motion"]
 
@@ -97,8 +97,9 @@ class Motion:
         fade = (bumps[:, None] * mesh.depth[None, :] ** 2).reshape(-1, 1)
         bumpy = mesh.positions + fade * np.repeat(mesh.rays, mesh.levels, axis=0)
         mu = np.where(mesh.is_exocarp, params.modulus_ratio, 1.0)
-        # by element: the skin is stiff enough as it is
-        self._march_kappa_ratio = np.where(mesh.is_exocarp, MARCH_KAPPA, settings.march_kappa_ratio)
+        # by element
+        ratios = settings.skin_march_kappa_ratio, settings.march_kappa_ratio
+        self._march_kappa_ratio = np.where(mesh.is_exocarp, *ratios)
         self._moduli = mu, self._march_kappa_ratio * mu
         self.rest = np.ones(len(mu))
         self._made: tuple[Floats, Layout] | None = None

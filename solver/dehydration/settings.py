@@ -15,7 +15,7 @@ from .fresh.loading import Loading
 from .fresh.mesh import flesh_span, layer_fractions
 from .params import DehydrationParams
 
-__all__ = ["MARCH_KAPPA", "Settings", "choose", "expected_cost"]
+__all__ = ["Settings", "choose", "expected_cost"]
 
 
 @dataclass(frozen=True)
@@ -24,25 +24,28 @@ class Settings:
 
     n: elements per edge of the cubed sphere. core: fractions of the core's layer breakpoints. full_levels: outermost
     core layers that are integrated fully, the others take one point.
-    kappa_ratio: bulk over shear modulus; march_kappa_ratio: the one of the flesh that is marched with (see
-    `kernel.bulk`; the skin's is `MARCH_KAPPA`).
+    kappa_ratio: bulk over shear modulus; march_kappa_ratio, skin_march_kappa_ratio: those that flesh and skin are
+    marched with (see `kernel.bulk`).
     start: shrinkage below which the fruit is still smooth, where the march begins. pace: shrinkage per step of the
-    march. copies: mirror images that make up the whole fruit. damping: per step, while marching; swing_damping and
-    calm_damping: while a stage settles (see `settle.settle`). residual, drift: at which a stage counts as settled (see
-    `settle.State`). swing_steps, calm_steps: longest turn of each way of settling. settle_steps: after which a stage
-    does not settle. clearance: gap that self-contact keeps, in exocarp thicknesses. rungs: shrinkages of the settled
-    states on the way.
+    march. copies: mirror images that make up the whole fruit. damping: per step, while marching; swing_damping,
+    easing_damping and calm_damping: while a stage settles (see `settle.settle`). residual, drift: at which a stage
+    counts as settled (see `settle.State`); near: residual below which it is eased and does not swing. swing_steps,
+    calm_steps: longest turn of each way of settling. settle_steps: after which a stage does not settle. clearance: gap
+    that self-contact keeps, in exocarp thicknesses. rungs: shrinkages of the settled states on the way.
     """
 
     n: int
     core: Floats
     kappa_ratio: float
     march_kappa_ratio: float
+    skin_march_kappa_ratio: float
     pace: float
     damping: float
     swing_damping: float
+    easing_damping: float
     calm_damping: float
     residual: float
+    near: float
     drift: float
     swing_steps: int
     calm_steps: int
@@ -97,6 +100,10 @@ _STEPS, _STEPS_N, _STEPS_SPAN = 2000.0, 24, 0.3
 #: Damping per step at the same reference: low enough not to delay the onset; and while a stage settles. The slowest
 #: modes keep their shape on every mesh, so per step they slow down as the step shrinks, and damping with them.
 _DAMPING, _SWING_DAMPING = 0.004, 0.0005
+#: Damping of a turn of easing over a swing's, and the residual over the one that counts as settled within which a state
+#: gets new rest volumes after a swing, or when it swings no more. A swing goes past the end of ways so soft that a
+#: calmed state creeps along them: thin skins at default swung to and fro until their steps were spent.
+_EASING, _NEAR = 20.0, 3.0
 #: Edge over thickness of the skin's elements from which its waves are the faster for it, as its columns share their
 #: masses (see `kernel.coupled`; 1.5 to 2.1 times at te = 0.02 and 0.04), and by how much at most. Swings of full length
 #: took such skins past where they were going: te = 0.02 at default took 53,000 steps in place of 4,000 to s = 0.2.
@@ -106,7 +113,13 @@ _SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 750, 400, 40_000
 #: Bulk over shear modulus that all qualities stand for, off by 1e-4 from incompressible in radius; and that steps are
 #: taken with. By 15 they are 1.4 times as long, but what balances at 1000 may be unstable at 15 while rest volumes
 #: stay: te = 0.02, gamma = 10 at default took four times the steps and did not settle (record dehydration-settling).
-_KAPPA, MARCH_KAPPA = 1000.0, 30.0
+_KAPPA, _MARCH_KAPPA = 1000.0, 30.0
+#: Exocarp thickness below which the kappa/mu that is marched with, damping of easing and what is near grow as it falls,
+#: and by how much at most: thinner skins than a quarter of it are hardly ever run.
+#: Volumes that give way are as soft as the longest ways of a net of wrinkles, which are more wrinkles long on thinner
+#: skins: at te = 0.01, under rest volumes that were held, stages at default crept on for ever by 30, by more than
+#: drifts that count, and by 60 they are at rest. Easing by 20 and nearer than 3 takes twice the steps to s = 0.2 there.
+_THIN, _THINNER = 0.02, 4.0
 #: Bulk modulus of flesh that is marched with over that of its skin, 4 gamma te: softer flesh would take most of what
 #: the skin gives way by, and its rest volumes would follow for ever.
 _STIFFER = 2.0
@@ -149,16 +162,21 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
     slender = np.pi / 2 / n / (params.exocarp_thickness / 2)
     faster = min(max(slender / _SLENDER, 1.0), _FASTEST)
     stiffness = 4 * params.modulus_ratio * params.exocarp_thickness
+    thinner = min(max(_THIN / params.exocarp_thickness, 1.0), _THINNER)
+    march_kappa = _MARCH_KAPPA * thinner
     return Settings(
         n=n,
         core=core,
         kappa_ratio=_KAPPA,
-        march_kappa_ratio=min(max(MARCH_KAPPA, _STIFFER * stiffness), _KAPPA),
+        march_kappa_ratio=min(max(march_kappa, _STIFFER * stiffness), _KAPPA),
+        skin_march_kappa_ratio=march_kappa,
         pace=_STEPS_SPAN / (_STEPS * scale) / loading.peak,
         damping=_DAMPING / scale,
         swing_damping=_SWING_DAMPING / scale,
+        easing_damping=_EASING * thinner * (_SWING_DAMPING / scale),
         calm_damping=0.06,
         residual=q.residual,
+        near=_NEAR * thinner * q.residual,
         drift=q.drift,
         swing_steps=round(_SWING_STEPS * scale / faster),
         calm_steps=_CALM_STEPS,

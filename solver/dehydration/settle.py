@@ -24,10 +24,6 @@ _LOOKS = 10
 #: Steps in which a surface at rest may drift so far.
 _REST_STEPS = 200
 
-#: Residual over the one that counts as settled within which a state gets new rest volumes after a swing, or when it
-#: swings no more.
-_NEAR = 3.0
-
 #: Share of the way that rest volumes go to those of the pressures: all of the way takes as many steps.
 _SHARE = 0.5
 
@@ -38,10 +34,9 @@ _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 #: as rest volumes hardly hold it, comes to rest when eased while they follow.
 _SWINGING = 0.75
 
-#: Damping of a turn of easing over a swing's, its parts, after each of which rest volumes follow, and what of the
-#: residual is left where it is worth another. A swing goes past the end of ways so soft that a calmed state creeps
-#: along them: thin skins at default swung to and fro until their steps were spent.
-_EASING, _EASING_PARTS, _EASED = 20.0, 2, 0.7
+#: Parts of a turn of easing, after each of which rest volumes follow, and what of the residual is left where it is
+#: worth another.
+_EASING_PARTS, _EASED = 2, 0.7
 
 #: Turns of calming alone in which a state comes to rest under new rest volumes, before it swings again.
 _CALM_TURNS = 3
@@ -221,7 +216,7 @@ def _come_to_rest(
         balanced = residual <= settings.residual and drift <= settings.drift
         if balanced and behind <= settings.residual:
             break
-        near = (calm == 0 or late) and residual <= _NEAR * settings.residual
+        near = (calm == 0 or late) and residual <= settings.near
         if spent < settings.settle_steps and (balanced or near):
             rest = rest * lag**_SHARE
         # what is eased gets nearer each time, or it is not the end of a way but the middle of one
@@ -292,7 +287,7 @@ def _eased(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrink
     settings = motion.settings
     for _ in range(_EASING_PARTS):
         count = settings.swing_steps // _EASING_PARTS
-        motion.run(state, velocity, rest, count, shrinkage, shrinkage, _EASING * settings.swing_damping)
+        motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.easing_damping)
         rest = _followed(motion, state, rest, shrinkage, _SHARE)
     return rest
 

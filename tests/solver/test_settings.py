@@ -101,6 +101,16 @@ def test_rungs_stand_apart_where_that_was_tried(te, gamma, quality, wide):
     assert {0.05, 0.1, 0.2, 0.3} <= set(settings.rungs)
 
 
+@pytest.mark.parametrize(("te", "thinner"), [(0.2, 1), (0.04, 1), (0.02, 1), (0.016, 1.25), (0.01, 2), (0.005, 4)])
+def test_volumes_of_thin_skins_are_held_the_more_stiffly(te, thinner):
+    """While stages settle; and they are eased the more heavily, from farther off."""
+    settings = choose(SOLVER.parse({"te": te, "mirrors": "xyz"}), "preview", 0.3)
+    assert settings.skin_march_kappa_ratio == pytest.approx(30 * thinner)
+    assert settings.march_kappa_ratio == pytest.approx(max(30 * thinner, 8 * 10 * te))
+    assert settings.easing_damping == pytest.approx(20 * thinner * settings.swing_damping)
+    assert settings.near == pytest.approx(3 * thinner * settings.residual)
+
+
 def test_a_stage_has_the_mesh_that_it_has_beside_others():
     """Also where wrinkles take more elements than the quality has; where they would be refused it has the quality's."""
     thin = SOLVER.parse({"te": 0.012})

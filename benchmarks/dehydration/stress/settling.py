@@ -21,7 +21,7 @@ import xarray as xr
 from benchmarks.figures import RESULTS, Sheet, load
 from solver.contract import Context, Need
 from solver.contract.errors import SolverError
-from solver.dehydration import SOLVER, motion, settings, settle
+from solver.dehydration import SOLVER, settings, settle
 
 from ..balance import sphere_volume
 
@@ -40,9 +40,8 @@ _Change = dict[tuple[Any, str], Any]
 
 def _march_at(kappa: float) -> _Change:
     """Steps as long as this kappa/mu allows: all that is counted in them goes with their length."""
-    longer = math.sqrt(settings.MARCH_KAPPA / kappa)
-    of_both: _Change = {(module, "MARCH_KAPPA"): kappa for module in (settings, motion)}
-    return {**of_both, (settings, "_STEPS_N"): settings._STEPS_N * longer}
+    longer = math.sqrt(settings._MARCH_KAPPA / kappa)
+    return {(settings, "_MARCH_KAPPA"): kappa, (settings, "_STEPS_N"): settings._STEPS_N * longer}
 
 
 #: What is changed: names of a module, and their values.
