@@ -1,6 +1,7 @@
 """The bound of `masses`, compiled: it is taken of every element many times in a run, as masses follow the deformation.
 
-`masses.largest_stiffness` is its plain twin; the loops here are over one element's 36 distinct entries of L.
+`masses.largest_stiffness` is its plain twin. No sum may be reordered here: numba optimises a parallel loop once more
+before it keeps it, and the first process would have other last bits than those that load what it compiled.
 """
 
 from __future__ import annotations
@@ -15,6 +16,10 @@ from .fixed_point import QUANTUM
 from .metric import SLOPES, quadrature
 
 __all__ = ["element_bounds", "nodal_sums"]
+
+
+#: Parts of the elements, each with room of its own.
+_PARTS = 64
 
 
 @njit(cache=True, error_model="numpy")
@@ -35,9 +40,9 @@ def _sound(x: Floats, least_share: float) -> bool:
     return least > least_share * most
 
 
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "nsz", "arcp", "contract"})
+@njit(cache=True, error_model="numpy")
 def _stiffness(x: Floats, slopes: Floats, weights: Floats, g: Floats, b: Floats, l: Floats) -> float:  # noqa: E741
-    """Volume of an element with corners x (8, 3); adds its gradient to b (8, 3), and L to l (8, 8). g (8, 3): room."""
+    """Volume of an element with corners x (8, 3); adds its gradient to b (8, 3), and L to l (8, 8). g (3, 8): room."""
     volume = 0.0
     for q in range(weights.size):
         j00 = j01 = j02 = j10 = j11 = j12 = j20 = j21 = j22 = 0.0
@@ -56,44 +61,42 @@ def _stiffness(x: Floats, slopes: Floats, weights: Floats, g: Floats, b: Floats,
         volume += v
         for a in range(8):
             s, t, u = slopes[q, a, 0], slopes[q, a, 1], slopes[q, a, 2]
-            g[a, 0] = s * i00 + t * i01 + u * i02
-            g[a, 1] = s * i10 + t * i11 + u * i12
-            g[a, 2] = s * i20 + t * i21 + u * i22
+            g[0, a] = s * i00 + t * i01 + u * i02
+            g[1, a] = s * i10 + t * i11 + u * i12
+            g[2, a] = s * i20 + t * i21 + u * i22
         for a in range(8):
-            for k in range(3):
-                b[a, k] += v * g[a, k]
-            for c in range(a, 8):
-                l[a, c] += v * (g[a, 0] * g[c, 0] + g[a, 1] * g[c, 1] + g[a, 2] * g[c, 2])
-    for a in range(8):
-        for c in range(a):
-            l[a, c] = l[c, a]
+            g0, g1, g2 = v * g[0, a], v * g[1, a], v * g[2, a]
+            b[a, 0], b[a, 1], b[a, 2] = b[a, 0] + g0, b[a, 1] + g1, b[a, 2] + g2
+            # all of L, though it is symmetric: whole rows are the faster
+            for c in range(8):
+                l[a, c] += g0 * g[0, c] + g1 * g[1, c] + g2 * g[2, c]
     return volume
 
 
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "nsz", "arcp", "contract"})
-def _largest(l: Floats, b: Floats, volume: float, mu: float, kappa: float) -> float:  # noqa: E741
-    """The bound for scalar stiffness l (k, k) and volume gradient b (k, 3)."""
+@njit(cache=True, error_model="numpy")
+def _largest(l: Floats, b: Floats, volume: float, mu: float, kappa: float, row: Floats) -> float:  # noqa: E741
+    """The bound for scalar stiffness l (k, k) and volume gradient b (k, 3). row (k,): room."""
     count = len(l)
     squared = norm = along = 0.0
     for a in range(count):
-        for c in range(a, count):
-            entry = 0.0
-            for k in range(count):
-                entry += l[a, k] * l[c, k]
-            squared += entry * entry if c == a else 2.0 * entry * entry
-        for k in range(3):
-            entry = 0.0
+        row[:] = 0.0
+        e0 = e1 = e2 = 0.0
+        for k in range(count):
+            entry = l[a, k]
             for c in range(count):
-                entry += l[a, c] * b[c, k]
-            along += b[a, k] * entry
-            norm += b[a, k] * b[a, k]
+                row[c] += entry * l[k, c]
+            e0, e1, e2 = e0 + entry * b[k, 0], e1 + entry * b[k, 1], e2 + entry * b[k, 2]
+        for c in range(count):
+            squared += row[c] * row[c]
+        along += b[a, 0] * e0 + b[a, 1] * e1 + b[a, 2] * e2
+        norm += b[a, 0] * b[a, 0] + b[a, 1] * b[a, 1] + b[a, 2] * b[a, 2]
     shear = 2.0 * mu * math.sqrt(math.sqrt(squared))
     bulk = kappa * norm / volume
     total = bulk + 2.0 * mu * along / norm + shear
     return 0.5 * (total + math.sqrt(max(total * total - 4.0 * bulk * shear, 0.0)))
 
 
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "nsz", "arcp", "contract"})
+@njit(cache=True, error_model="numpy")
 def _half(l: Floats, b: Floats, sign: float, part: Floats, slope: Floats) -> None:  # noqa: E741
     """Fill `part` (4, 4) and `slope` (4, 3), what l and b are of (t + sign b) / sqrt 2 of the ends of zeta's edges."""
     for a in range(4):
@@ -104,7 +107,7 @@ def _half(l: Floats, b: Floats, sign: float, part: Floats, slope: Floats) -> Non
             slope[a, i] = math.sqrt(0.5) * (b[2 * a + 1, i] + sign * b[2 * a, i])
 
 
-@njit(cache=True, error_model="numpy", parallel=True, fastmath={"reassoc", "nsz", "arcp", "contract"})
+@njit(cache=True, error_model="numpy", parallel=True)
 def _bounds(
     state: Ints32,
     connectivity: Ints,
@@ -118,21 +121,24 @@ def _bounds(
     bounds: Floats,
 ) -> None:
     """Fill bounds (3, ne) of `elements`, the last two if `split`; slopes (q, 8, 3): the rule's shape derivatives."""
-    for place in prange(elements.size):
-        e = elements[place]
-        x, b, g, l = np.empty((8, 3)), np.zeros((8, 3)), np.empty((8, 3)), np.zeros((8, 8))  # noqa: E741
-        for a in range(8):
-            for i in range(3):
-                x[a, i] = state[connectivity[e, a], i] * QUANTUM
-        if not _sound(x, least_share):
-            continue
-        volume = _stiffness(x, slopes, weights, g, b, l)
-        bounds[0, e] = _largest(l, b, volume, mu[e], kappa[e])
-        if split:
-            part, slope = np.empty((4, 4)), np.empty((4, 3))
-            for k in range(2):
-                _half(l, b, 1.0 - 2.0 * k, part, slope)
-                bounds[1 + k, e] = _largest(part, slope, volume, mu[e], kappa[e])
+    for part in prange(_PARTS):
+        # an array for each element would come from the heap, which takes as long as the rest
+        x, b, g, l = np.empty((8, 3)), np.empty((8, 3)), np.empty((3, 8)), np.empty((8, 8))  # noqa: E741
+        half, slope, row = np.empty((4, 4)), np.empty((4, 3)), np.empty(8)
+        for place in range(part * elements.size // _PARTS, (part + 1) * elements.size // _PARTS):
+            e = elements[place]
+            for a in range(8):
+                for i in range(3):
+                    x[a, i] = state[connectivity[e, a], i] * QUANTUM
+            if not _sound(x, least_share):
+                continue
+            b[:], l[:] = 0.0, 0.0
+            volume = _stiffness(x, slopes, weights, g, b, l)
+            bounds[0, e] = _largest(l, b, volume, mu[e], kappa[e], row)
+            if split:
+                for k in range(2):
+                    _half(l, b, 1.0 - 2.0 * k, half, slope)
+                    bounds[1 + k, e] = _largest(half, slope, volume, mu[e], kappa[e], row[:4])
 
 
 def element_bounds(
