@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
 from solver import quantities, registry
 from solver.contract import InvalidInput, Solver
 
-from .errors import UnknownSolver
+from .errors import InvalidQuery, UnknownSolver, Wrong
 
-__all__ = ["Axis", "axes", "solver_named", "units_of"]
+__all__ = ["Axis", "axes", "row_of", "solver_named", "units_of"]
 
 
 class Axis(NamedTuple):
@@ -64,3 +65,19 @@ def axes(solver_name: str) -> Mapping[str, Axis]:
 def units_of(names: Mapping[str, Any] | tuple[str, ...]) -> dict[str, str]:
     """Return the units of those names that are registered quantities."""
     return {name: quantities.QUANTITIES[name].units for name in names if name in quantities.QUANTITIES}
+
+
+def row_of(stages: Sequence[float], stage: float, of: str = "result") -> int:
+    """Return which of a run's `stages` is the one that was asked for.
+
+    Raises:
+        InvalidQuery: none is; of: what the run is called.
+
+    """
+    near = min(range(len(stages)), key=lambda i: abs(stages[i] - stage))
+    # no nearness of nan and of infinite stages is more than a number
+    if not math.isclose(stages[near], stage, rel_tol=1e-9, abs_tol=1e-9):
+        # of so many digits that what is advised is found
+        advice = f"Take one of {', '.join(f'{s:.12g}' for s in stages)}."
+        raise InvalidQuery.of([Wrong("stage", f"the {of} has no stage {stage:.12g}", advice)])
+    return near

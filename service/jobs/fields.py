@@ -10,7 +10,7 @@ from starlette.responses import Response
 
 from store.store import Store
 
-from .. import problems
+from .. import problems, vocabulary
 from ..errors import InvalidQuery, Wrong
 from ..settings import Settings
 from ..views.shape import FieldsPage
@@ -69,11 +69,7 @@ def encode(run: xr.Dataset, names: str | None, stage: float | None, most: int, c
         wrong = [Wrong(called, f"the result has no {name[:40]!r}", f"Known: {', '.join(known)}.") for name in unknown]
         raise InvalidQuery.of(wrong)
     if stage is not None:
-        stages = run["stage"].values.tolist()
-        near = min(range(len(stages)), key=lambda i: abs(stages[i] - stage))
-        if abs(stages[near] - stage) > 1e-9 * max(1.0, abs(stage)):
-            advice = f"Take one of {', '.join(f'{s:g}' for s in stages)}."
-            raise InvalidQuery.of([Wrong("stage", f"the result has no stage {stage:g}", advice)])
+        near = vocabulary.row_of(run["stage"].values.tolist(), stage)
         # the vertices and faces of a mesh that changes its triangles lie end to end
         for dim in ("vertex", "face"):
             if f"{dim}_count" in run:

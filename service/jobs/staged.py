@@ -13,7 +13,7 @@ from solver.lattice import lattice
 from store.ledger.jobs import Job
 
 from .. import vocabulary
-from ..errors import InvalidQuery, NotAcceptable, Wrong
+from ..errors import NotAcceptable
 from ..formats import About, Format
 
 if TYPE_CHECKING:
@@ -44,11 +44,7 @@ def encode(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> by
     solver = vocabulary.solver_named(job.solver)
     params = _params(solver, job)
     stages = [float(value) for value in run["stage"].values]
-    wanted = stages[-1] if stage is None else stage
-    near = min(range(len(stages)), key=lambda i: abs(stages[i] - wanted))
-    if abs(stages[near] - wanted) > 1e-9 * max(1.0, abs(wanted)):
-        advice = f"Take one of {', '.join(f'{s:g}' for s in stages)}."
-        raise InvalidQuery.of([Wrong("stage", f"the result has no stage {wanted:g}", advice)])
+    near = vocabulary.row_of(stages, stages[-1] if stage is None else stage)
     if is_surface(run, job) and "position" not in run and (fresh := solver.fresh(job.params)) is not None:
         points = fresh.points(*lattice(run.sizes["colatitude"]))
         run["position"] = run["displacement"] + points.astype(run["displacement"].dtype)

@@ -195,5 +195,5 @@ def _said(one: Candidate) -> Match:
         parts={name: round(value, 4) for name, value in one.parts.items()},
         edges=[name or symbol for name in one.edges],
         link=f"/v1/shapes/{info.solver}?{query}",
-        command=" ".join(f"wizen query --name {info.name} {sets} --stages {stage:g} --out shape.glb".split()),
+        command=" ".join(f"wizen query --name {info.name} {sets} --stages {stage:.15g} --out shape.glb".split()),
     )

@@ -6,7 +6,6 @@ reads its output with a reader that is not ours.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
@@ -14,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..errors import InvalidQuery, UnfitFormat, Wrong
+from ..vocabulary import row_of
 from . import animation, caches, maps, text, usd, usdz
 from .options import Options
 from .view import Sequence, of_run
@@ -87,13 +87,7 @@ def prepared(run: xr.Dataset, options: Options, stage: float | None = None, sing
     whole = replace(of_run(run), colour=options.colour, scale=options.scale)
     if stage is None:
         return whole.at(-1) if single else whole
-    near = min(range(len(whole)), key=lambda i: abs(whole.stages[i] - stage))
-    # no nearness of nan and of infinite stages is more than a number
-    if not math.isclose(whole.stages[near], stage, rel_tol=1e-9, abs_tol=1e-9):
-        # of so many digits that what is advised is found
-        advice = f"Take one of {', '.join(f'{s:.12g}' for s in whole.stages)}."
-        raise InvalidQuery.of([Wrong("stage", f"the result has no stage {stage:.12g}", advice)])
-    return whole.at(near)
+    return whole.at(row_of(whole.stages, stage))
 
 
 def _opened(run: xr.Dataset, cut: str, stage: float | None, single: bool) -> xr.Dataset:

@@ -25,6 +25,7 @@ from ...sequences import of_run
 from ...sequences.options import Options
 from ...sequences.standing import Extra, cards, stems
 from ...sequences.view import Surface
+from ...vocabulary import row_of
 from ..meshes import Packed, quantised, weathered
 from ..request import Item
 from .kind import Curve, Kind
@@ -207,7 +208,7 @@ def _read(root: Path, key: str, stages: tuple[float, ...], shade: str | None, pr
     """Return stages of a run, which never changes, as a scene wants them."""
     run = Store(root).get(key)
     sequence = of_run(run)
-    rows = [_row(sequence.stages, stage) for stage in stages] or [len(sequence) - 1]
+    rows = [row_of(sequence.stages, stage, "run") for stage in stages] or [len(sequence) - 1]
     if len(rows) > 1 and not sequence.kept:
         advice = "Take a stage, or an item for each of several."
         raise InvalidQuery.of([Wrong("curve", "the triangles of this run change from stage to stage", advice)])
@@ -230,14 +231,6 @@ def _read(root: Path, key: str, stages: tuple[float, ...], shade: str | None, pr
     trust = {"expected_error": _error(run.attrs, solver), "exact": True, "converged": converged}
     dressed = dressed._replace(thin=solid.is_open or bool(standing))
     return Whole(solid, dressed, sequence.unit or None, bool(sequence.lattice), source, trust)
-
-
-def _row(held: Sequence[float], stage: float) -> int:
-    near = min(range(len(held)), key=lambda i: abs(held[i] - stage))
-    if abs(held[near] - stage) > 1e-9 * max(1.0, abs(stage)):
-        advice = f"Take one of {', '.join(f'{s:g}' for s in held)}."
-        raise InvalidQuery.of([Wrong("stage", f"the run has no stage {stage:g}", advice)])
-    return near
 
 
 def _coloured(
