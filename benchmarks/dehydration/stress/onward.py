@@ -33,7 +33,7 @@ _HEAD = (
 _STAGES = (0.05, 0.1, 0.15, 0.2, 0.25, 0.3)
 _FRUITS = (
     *(("preview", 0.04, 10.0), ("preview", 0.04, 30.0), ("default", 0.1, 10.0), ("default", 0.04, 10.0)),
-    *(("default", 0.04, 30.0), ("fine", 0.04, 10.0), ("default", 0.02, 10.0)),
+    *(("default", 0.04, 30.0), ("fine", 0.04, 10.0), ("default", 0.02, 10.0), ("preview", 0.01, 10.0)),
 )
 _SEEDS = (0, 1)
 #: Part of the steps of the longest settling that a stage goes on for.
