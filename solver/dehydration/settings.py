@@ -115,10 +115,10 @@ _SWING_STEPS, _CALM_STEPS, _SETTLE_STEPS = 750, 400, 40_000
 #: stay: te = 0.02, gamma = 10 at default took four times the steps and did not settle (record dehydration-settling).
 _KAPPA, _MARCH_KAPPA = 1000.0, 30.0
 #: Exocarp thickness below which the kappa/mu that is marched with, damping of easing and what is near grow as it falls,
-#: and by how much at most: thinner skins than a quarter of it are hardly ever run.
-#: Volumes that give way are as soft as the longest ways of a net of wrinkles, which are more wrinkles long on thinner
-#: skins: at te = 0.01, under rest volumes that were held, stages at default crept on for ever by 30, by more than
-#: drifts that count, and by 60 they are at rest. Easing by 20 and nearer than 3 takes twice the steps to s = 0.2 there.
+#: and by how much at most: thinner skins than a quarter of it are hardly ever run. Volumes that give way are as soft as
+#: the longest ways of a net of wrinkles, which are more wrinkles long on thinner skins: at te = 0.01, under rest
+#: volumes that were held, stages at default crept on for ever by 30, by more than the drift that counts; by 60 they
+#: come to rest. Eased no more than other skins they would, too, in more steps.
 _THIN, _THINNER = 0.02, 4.0
 #: Bulk modulus of flesh that is marched with over that of its skin, 4 gamma te: softer flesh would take most of what
 #: the skin gives way by, and its rest volumes would follow for ever.

@@ -93,3 +93,27 @@ def test_generated_module_finds_a_writable_directory(tmp_path, monkeypatch):
     monkeypatch.setattr(source, "cache_directories", lambda: iter([blocked / "sub"]))
     with pytest.raises(OSError, match="NUMBA_CACHE_DIR"):
         source.generated_path()
+
+
+RUN = """
+import hashlib
+from solver import registry
+from solver.contract import Context, Need
+solver = registry.get("dehydration")
+params = solver.parse({"te": 0.04, "gamma": 30.0, "mirrors": "xyz"})
+need = Need(stages=(0.2, 0.3), quality="preview", fields=("mesh_position",))
+found = solver.solve(params, need, Context())
+print(hashlib.sha256(found["mesh_position"].values.tobytes()).hexdigest())
+"""
+
+
+@pytest.mark.slow  # it compiles all kernels from nothing
+def test_a_run_has_the_same_bytes_compiled_or_loaded(tmp_path):
+    """Folds touch in it, so contact is part of it; numba keeps other code of some parallel loops than it ran first."""
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)}
+    compiled, loaded = (
+        subprocess.run([sys.executable, "-c", RUN], env=environment, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
+    )
+    assert compiled
+    assert compiled == loaded
