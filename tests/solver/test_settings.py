@@ -92,7 +92,8 @@ def test_elements_of_the_skin_are_as_wide_as_it_is_thick_at_fine(quality, width)
         (0.04, 3.0, "preview", False),
         (0.04, 10.0, "default", True),
         (0.05, 30.0, "default", False),
-        (0.04, 10.0, "fine", False),
+        (0.04, 10.0, "fine", True),
+        (0.05, 30.0, "fine", False),
     ],
 )
 def test_rungs_stand_apart_where_that_was_tried(te, gamma, quality, wide):
