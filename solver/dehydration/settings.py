@@ -64,11 +64,17 @@ class Settings:
 
 @dataclass(frozen=True)
 class _Quality:
+    """per_wavelength: elements of an edge; fewest, most of them. first_layer: thickness of the core layer at the
+    interface, in wavelengths; growth: how fast layers grow inwards.
+    """
+
     per_wavelength: float
     fewest: int
     most: int
     residual: float
     drift: float
+    first_layer: float
+    growth: float
     full_levels: int
 
 
@@ -81,13 +87,14 @@ _WIDE = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 #: Skins and moduli for which rungs stand apart: others were not tried so.
 _WIDE_SKINS, _WIDE_MODULI = (0.0075, 0.04), (5.0, 50.0)
 
-#: Under deep folds core layers with one point each turn inside out: the three below the skin at gamma = 10 (s = 0.25),
-#: the fourth at gamma = 50 (s = 0.3). Below five, J stays above 0.6; one point there changes the roughness by less than
-#: another seed does.
+#: Under deep folds core layers with one point each turn inside out: those within half a wavelength of the skin at
+#: gamma = 10 (s = 0.25), within two thirds at gamma = 50 (s = 0.3). Below, J stays above 0.6; one point there changes
+#: the roughness by less than another seed does. Nor do layers do more that grow faster than fine's, which are two of
+#: seven to ten fewer (record dehydration-settling).
 _QUALITIES = {
-    "preview": _Quality(4.2, 18, 48, 2e-3, 2e-2, 5),
-    "default": _Quality(6.0, 24, 96, 1e-3, 1e-2, 5),
-    "fine": _Quality(9.0, 36, 160, 1e-3, 5e-3, 1000),
+    "preview": _Quality(4.2, 18, 48, 2e-3, 2e-2, 0.12, 1.7, 3),
+    "default": _Quality(6.0, 24, 96, 1e-3, 1e-2, 0.08, 1.6, 4),
+    "fine": _Quality(9.0, 36, 160, 1e-3, 5e-3, 0.08, 1.3, 1000),
 }
 
 #: Elements a wavelength below which a mesh makes up a pattern of its own.
@@ -124,8 +131,6 @@ _THIN, _THINNER = 0.02, 4.0
 #: Bulk modulus of flesh that is marched with over that of its skin, 4 gamma te: softer flesh would take most of what
 #: the skin gives way by, and its rest volumes would follow for ever.
 _STIFFER = 2.0
-#: Thickness of the core layer at the interface, in wavelengths, and how fast layers grow inwards.
-_FIRST_LAYER, _GROWTH = 0.08, 1.3
 #: Wall seconds per element and step on one core, for estimates only.
 _SECONDS_PER_ELEMENT_STEP = 5e-8
 #: Steps that a stage settles for, by and large (at the same reference), for estimates only.
@@ -157,7 +162,7 @@ def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Set
     start = margin * onset_estimate(params.modulus_ratio, min(params.stone)) / loading.peak
     # where flesh is more than twice as thick as on average, layers are counted on it
     flesh = max(float(np.mean(params.radii[:7])) - max(params.stone), flesh_span(params)[1] / 2)
-    core = layer_fractions(max(flesh, 0.05), _FIRST_LAYER * min(wavelength, 0.4), _GROWTH)
+    core = layer_fractions(max(flesh, 0.05), q.first_layer * min(wavelength, 0.4), q.growth)
     n = _wrinkled(params, n, len(core) + 1, wavelength, last > start)
     scale = n / _STEPS_N
     slender = np.pi / 2 / n / (params.exocarp_thickness / 2)

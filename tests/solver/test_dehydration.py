@@ -141,7 +141,7 @@ def test_a_blow_up_is_a_typed_error_with_the_last_good_stage(monkeypatch):
 
     monkeypatch.setattr(run_module, "choose", reckless)
     params = SOLVER.parse({"te": 0.1, "gamma": 300.0, "imperfection": 0.01})
-    need = Need(quality="preview", stages=(0.005, 0.6), resolution=16)
+    need = Need(quality="fine", stages=(0.005, 0.6), resolution=16)
     with pytest.raises(Unstable, match="blew up") as caught:
         SOLVER.solve(params, need)
     assert caught.value.last_stage == 0.005

@@ -3,13 +3,14 @@
 Eighths of four stages: steps of the whole run, roughness, how far volumes are from a sphere's, and what a stage is left
 with, as things are and with one thing changed: rungs that do not stand apart, swings where it would be eased, rest
 volumes that stay in a swing, or that go all of the way to those of the pressures, the march at another kappa/mu, with
-steps as long as it allows. Then thick and stiff skins at preview, to where they blow up. Kept as dehydration-settling;
+steps as long as it allows, layers of flesh as thin as fine's. Then thick and stiff skins at preview, to where they blow up. Kept as dehydration-settling;
 runs that are in the record already, of this version, are not run again.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import math
 import time
 from collections.abc import Iterator
@@ -44,6 +45,13 @@ def _march_at(kappa: float) -> _Change:
     return {(settings, "_MARCH_KAPPA"): kappa, (settings, "_STEPS_N"): settings._STEPS_N * longer}
 
 
+def _fine_layers() -> _Change:
+    """Layers of flesh that grow as slowly as fine's, down to as deep fully integrated."""
+    fine, qualities = settings._QUALITIES["fine"], settings._QUALITIES
+    same = {"first_layer": fine.first_layer, "growth": fine.growth, "full_levels": 5}
+    return {(settings, "_QUALITIES"): {name: dataclasses.replace(one, **same) for name, one in qualities.items()}}
+
+
 #: What is changed: names of a module, and their values.
 _CHANGES: dict[str, _Change] = {
     "rungs close together": {(settings, "_WIDE"): settings._RUNGS},
@@ -52,6 +60,7 @@ _CHANGES: dict[str, _Change] = {
     "volumes all of the way": {(settle, "_SHARE"): 1.0},
     "march at 15": _march_at(15.0),
     "march at 60": _march_at(60.0),
+    "layers of fine": _fine_layers(),
 }
 _EASY = (("preview", 0.04, 10.0), ("preview", 0.04, 50.0), ("preview", 0.02, 10.0), ("preview", 0.02, 50.0))
 _CAREFUL = (("default", 0.04, 10.0), ("default", 0.02, 10.0))
