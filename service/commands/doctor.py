@@ -224,11 +224,13 @@ def _tables(root: Path, deep: bool) -> Iterator[Finding]:
         except StoreError as error:
             yield Finding("tables", "bad", error.message, error.advice)
             continue
-        current = registry.get(table.solver).version
+        solver = registry.get(table.solver)
         said = f"{name}: {table.solver} {table.version}, {len(table.keys)} runs"
-        if table.version != current:
-            advice = f"It is served as it is; version {current} of the solver is installed: sweep its plan again."
-            yield Finding("tables", "note", said, advice)
+        anew = f"version {solver.version} of the solver is installed: sweep its plan again."
+        if not solver.answers_from(table.version):
+            yield Finding("tables", "bad", said, f"It is refused as stale; {anew}")
+        elif table.version != solver.version:
+            yield Finding("tables", "note", said, f"It is served as it is; {anew}")
         else:
             yield Finding("tables", "good", said)
         if deep:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import socket
 import sqlite3
 from pathlib import Path
@@ -14,6 +15,7 @@ from service.cli import app
 from service.commands import doctor
 from service.commands.doctor import Finding, examine
 from service.settings import Settings
+from solver import registry
 from store import tables
 from store.ledger.filesystem import filesystem
 from store.store import Store
@@ -51,6 +53,17 @@ def test_a_table_that_came_without_its_runs_is_noted(own: Store, port: int) -> N
     seen = found(own.root, port, deep=True)["bytes"]
     assert (seen.state, seen.advice) == ("note", "")
     assert "None of the table's runs is here" in seen.seen
+
+
+@pytest.mark.parametrize(("answered", "state", "word"), [(True, "note", "served"), (False, "bad", "stale")])
+def test_a_table_of_another_version_is_served_or_stale(
+    own: Store, port: int, monkeypatch: pytest.MonkeyPatch, answered: bool, state: str, word: str
+) -> None:
+    solver = registry.get(tables.info(own, own.table_names()[0]).solver)
+    later = dataclasses.replace(solver, version="99", tables_of=(solver.version,) if answered else ())
+    monkeypatch.setattr(registry, "get", lambda name: later)
+    seen = found(own.root, port)["tables"]
+    assert (seen.state, word in seen.advice, "sweep its plan" in seen.advice) == (state, True, True)
 
 
 def test_a_port_that_another_has_is_told_from_our_own(own: Store) -> None:
