@@ -1,9 +1,9 @@
 """Every `wizen`, `curl` and Python block that a document shows, run as it stands in a directory prepared for it.
 
 The directory holds what the documents speak of: a store `demo` with results and a table, stored runs, a mesh, a plan. A
-service answers beside it; its port and the key of a result stand in for the ones that are printed. Commands that solve
-take minutes together and are marked slow. A quick `wizen` that needs nothing of a shell is called in this process,
-which takes a third of the time: what is installed as `wizen` builds the table here, and serves.
+service answers beside it; its port, the key of a result and the table's plan stand in for the ones that are printed.
+Commands that solve take minutes together and are marked slow. A quick `wizen` that needs nothing of a shell is called
+in this process, which takes a third of the time: what is installed as `wizen` builds the table here, and serves.
 """
 
 from __future__ import annotations
@@ -96,9 +96,11 @@ class Workshop:
         self.at, self.port, self.key = at, port, key
 
     def here(self, command: str) -> str:
-        """Return a command with the port, the key and the table's generation that there are."""
+        """Return a command with the port, the key, the table's generation and its plan that there are."""
         generation = next((self.at / "demo" / "tables" / "default").glob("*.h5")).stem
         command = command.replace(_PORT, str(self.port)).replace("/jobs/KEY/", f"/jobs/{self.key}/")
+        # the table is of made-up runs, which no sweep of the plan that is shown shall find done
+        command = command.replace("wizen refine examples/fig7-right.toml", "wizen refine plan.toml")
         return re.sub(r"\b[0-9a-f]{16}\b", generation, command)
 
     def call(self, command: str) -> tuple[int, str]:
