@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from . import holding
-from .errors import full_disk
+from .errors import ReadOnlyStore, full_disk
 
 __all__ = ["TRAILER", "adopt", "body", "clean", "is_whole", "make_directory", "publish", "scratch", "seal", "sync"]
 
@@ -31,11 +31,19 @@ _ABANDONED = 3600.0
 
 
 def make_directory(path: Path) -> None:
-    """Make a directory and those above it; what is new is on the disk, name and all, when this returns."""
+    """Make a directory and those above it; what is new is on the disk, name and all, when this returns.
+
+    Raises:
+        ReadOnlyStore: there is a file in its place, or in that of one above it.
+
+    """
     if path.is_dir():
         return
     make_directory(path.parent)
-    path.mkdir(exist_ok=True)
+    try:
+        path.mkdir(exist_ok=True)
+    except FileExistsError:
+        raise ReadOnlyStore(f"{path} is no directory.", "Name another one, or move away what is there.") from None
     sync(path.parent)
 
 

@@ -5,12 +5,15 @@
     root/tables/<name>/scalars.nc     numbers of the runs over their axes, see `scalars`
 
 A new generation becomes current by renaming the manifest; whoever has the old one open keeps it until it reopens,
-even when it is pruned.
+even when it is pruned. Who makes or prunes generations of one table waits for who does so already; readers wait never.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+import contextlib
+import fcntl
+import os
+from collections.abc import Collection, Iterable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, cast
@@ -18,7 +21,7 @@ from typing import TYPE_CHECKING, Literal, cast
 from solver.contract import Solver
 
 from . import seal
-from .errors import CorruptTable, EmptyTable, MixedSamples, StoreError, UnknownJob
+from .errors import CorruptTable, EmptyTable, MixedSamples, StoreError, UnknownJob, full_disk
 from .generations import generate, generation, own
 from .generations.samples import Choice, collect
 from .manifest import TableInfo, directory, read_manifest, write_manifest
@@ -61,7 +64,32 @@ def build(
 
     """
     samples = collect(store, solver.name, solver.params.axes, Choice(plan, quality, version, keys))
-    return _write(store, solver, name, generate.results(store, samples), resolution, dtype, text)
+    home = directory(store.tables_dir, name)
+    with full_disk(home):
+        seal.make_directory(home)
+    with _turn(store, name):
+        return _write(store, solver, name, generate.results(store, samples), resolution, dtype, text)
+
+
+@contextlib.contextmanager
+def _turn(store: Store, name: str) -> Iterator[None]:
+    """Wait until nobody else makes or prunes generations of a table; what is current changes for nobody else meanwhile.
+
+    Raises:
+        UnknownTable: there is none of that name.
+
+    """
+    try:
+        handle = os.open(directory(store.tables_dir, name), os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    except FileNotFoundError:
+        info(store, name)  # says so
+        raise
+    try:
+        with contextlib.suppress(OSError):  # some network file systems lock no directories
+            fcntl.flock(handle, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(handle)
 
 
 def _write(
@@ -133,16 +161,18 @@ def rebuild(
         StorageFull: the disk is full; the old generation stays current.
 
     """
-    now = info(store, name)
-    if now.solver != solver.name:
-        raise MixedSamples(f"table {name!r} is of {now.solver}, not of {solver.name}.", "Build one under another name.")
-    precision: Precision = dtype or cast(Precision, now.dtype)
-    band = resolution or now.resolution
-    if is_alone(store, now):
-        source = _own(store, now, band, more)
-    else:
-        source = generate.results(store, collect(store, solver.name, now.places, Choice(keys={*now.keys, *more})))
-    return _write(store, solver, name, source, band, precision, now.plan)
+    with _turn(store, name):
+        now = info(store, name)
+        if now.solver != solver.name:
+            said = f"table {name!r} is of {now.solver}, not of {solver.name}."
+            raise MixedSamples(said, "Build one under another name.")
+        precision: Precision = dtype or cast(Precision, now.dtype)
+        band = resolution or now.resolution
+        if is_alone(store, now):
+            source = _own(store, now, band, more)
+        else:
+            source = generate.results(store, collect(store, solver.name, now.places, Choice(keys={*now.keys, *more})))
+        return _write(store, solver, name, source, band, precision, now.plan)
 
 
 def is_alone(store: Store, table: TableInfo) -> bool:
@@ -227,8 +257,9 @@ def prune(store: Store, name: str = "default") -> list[Path]:
         CorruptTable: its manifest is damaged, so that nobody knows which generation is current.
 
     """
-    current = path_of(store, info(store, name))
-    old = [path for path in sorted(current.parent.glob("*.h5")) if path != current]
-    for path in old:
-        path.unlink(missing_ok=True)
+    with _turn(store, name):
+        current = path_of(store, info(store, name))
+        old = [path for path in sorted(current.parent.glob("*.h5")) if path != current]
+        for path in old:
+            path.unlink(missing_ok=True)
     return old

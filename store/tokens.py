@@ -31,8 +31,11 @@ SCOPES: tuple[Scope, ...] = get_args(Scope)
 
 #: Longest life of a token [s]: 300 years.
 _LONGEST = 300 * 365.25 * 86400
+#: No time is later [s since the epoch].
+_LATEST = 1e11
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 _.@-]{0,63}")
+_DIGEST = re.compile(r"[0-9a-f]{64}")
 _FORM = re.compile(r"wizen_([0-9a-f]{12})_[A-Za-z0-9_-]{43}")
 
 #: A file as the file system tells it: another inode, time or size is another content.
@@ -166,4 +169,17 @@ def _hash(secret: str) -> str:
 
 
 def _token(entry: dict[str, Any]) -> Token:
-    return Token(**{**entry, "scopes": tuple(entry["scopes"])})
+    """Return the token in an entry of the file.
+
+    Raises:
+        TypeError, KeyError, ValueError: it is none.
+
+    """
+    token = Token(**{**entry, "scopes": tuple(entry["scopes"])})
+    if not all(isinstance(said, str) for said in (token.id, token.name)) or not set(token.scopes) <= set(SCOPES):
+        raise ValueError("a token has an id, a name and scopes")
+    if _DIGEST.fullmatch(token.digest) is None:
+        raise ValueError("a token has a digest")
+    if not all(0 <= when < _LATEST for when in (token.created, 0 if token.expires is None else token.expires)):
+        raise ValueError("a token's times are seconds since the epoch")
+    return token

@@ -202,26 +202,32 @@ def _scalars(solver: str, params: Mapping[str, Any]) -> dict[str, Value]:
     return found
 
 
-def _condition(text: str) -> tuple[str, str, Value]:
+def _condition(text: str) -> tuple[str, str, str]:
     match = _CONDITION.fullmatch(text)
     if match is None:
         raise InvalidOption(
             f"--where {text.strip()!r} is no condition.", "Write for example te<0.03, or solver=growth."
         )
     name, sign, value = match.groups()
-    try:
-        return name, sign, float(value)
-    except ValueError:
-        return name, sign, {"true": True, "false": False}.get(value.lower(), value)
+    return name, sign, value
 
 
-def _meets(values: Mapping[str, Value], name: str, sign: str, wanted: Value) -> bool:
+def _meets(values: Mapping[str, Value], name: str, sign: str, wanted: str) -> bool:
     if name not in values:
         return False
-    value = values[name]
-    if isinstance(value, str) != isinstance(wanted, str):
-        return sign == "!="
-    return _OPERATORS[sign](value, wanted)
+    value, number = values[name], _number(wanted)
+    if isinstance(value, str):
+        # a version or a key may consist of digits; only what comes before what is then a question of numbers
+        both = (_number(value), number) if sign in ("<", ">", "<=", ">=") else (None, None)
+        return _OPERATORS[sign](value, wanted) if None in both else _OPERATORS[sign](*both)
+    return sign == "!=" if number is None else _OPERATORS[sign](value, number)
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return {"true": 1.0, "false": 0.0}.get(text.lower())
 
 
 def _order(value: Value) -> tuple[bool, Any]:

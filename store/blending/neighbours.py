@@ -87,7 +87,8 @@ class Neighbours:
         nearest, reach = float(distance[0]), float(distance[-1])
         if nearest < SAME:
             return Weighted(samples[:1], np.ones(1), 0.0)
-        weights = (nearest / distance[:-1] * np.maximum(1 - distance[:-1] / reach, 1e-12)) ** eta
+        parts = nearest / distance[:-1] * np.maximum(1 - distance[:-1] / reach, 1e-12)
+        weights = (parts / parts.max()) ** eta  # where all are as far as the next one, powers would vanish
         return Weighted(samples[:-1], weights / weights.sum(), nearest)
 
     def without(self, i: int, m: int) -> Weighted:

@@ -1,9 +1,9 @@
 """A store copied while it is in use, and brought back.
 
 A backup is a directory with results and generations of tables as a store has them, what changes (ledger, manifests,
-tokens) in a folder of its own for each copy, and a list of all files with their SHA-256 (`backup.json`). Results are
-immutable, so a later backup into the same directory copies only what is new. The list is written last: whatever is
-killed on the way, the backup before is still whole.
+plans, tokens) in a folder of its own for each copy, and a list of all files with their SHA-256 (`backup.json`). Results
+are immutable, so a later backup into the same directory copies only what is new, and anew what is not sound there. The
+list is written last: whatever is killed on the way, the backup before is still whole.
 
 The ledger is copied first, as SQLite sees it at one moment: what it calls done has its shard on the disk by then. A
 restored store appears at once, by a rename.
@@ -25,8 +25,9 @@ from typing import Any, NamedTuple
 from solver import __version__
 
 from .. import holding, seal
-from ..errors import CorruptBackup, CorruptLedger, MissingStore, ReadOnlyStore, full_disk
+from ..errors import CorruptBackup, CorruptLedger, CorruptTable, MissingStore, ReadOnlyStore, UnknownTable, full_disk
 from ..ledger.database import ask_the_system, readable
+from ..manifest import read_manifest
 from ..store import Store
 
 __all__ = ["Copied", "backup", "restore"]
@@ -35,7 +36,7 @@ _LIST = "backup.json"
 _LEDGER = "ledger.sqlite"
 _CHANGING = "changing"
 #: What a store is made of, besides its ledger. Quarantined stages and the marks of running jobs stay behind.
-_CHANGES = ("tables/*/scalars.nc", "tables/*/current.json", "tokens.json")
+_CHANGES = ("tables/*/scalars.nc", "tables/*/current.json", "plans/*.toml", "tokens.json")
 _STAYS = ("shards/??/*.h5", "tables/*/*.h5")
 _PRIVATE = ("tokens.json",)
 #: A claim means nothing after a restore: its worker belongs to the other store.
@@ -67,6 +68,7 @@ def backup(store: Store, to: Path) -> Copied:
             seal.clean(place)
         now = datetime.now(UTC)
         changing = f"{_CHANGING}/{now:%Y%m%dT%H%M%S}-{secrets.token_hex(4)}"
+        seal.make_directory(to / changing)  # of a store in which nothing changes it stays empty
         files = {_LEDGER: _copy_ledger(store, to, f"{changing}/{_LEDGER}")} if store.ledger.path.is_file() else {}
         new = 0
         # what changes first, then what there is by now: the generation that a manifest names is among it
@@ -75,7 +77,7 @@ def backup(store: Store, to: Path) -> Copied:
                 at = name if patterns is _STAYS else f"{changing}/{name}"
                 files[name], copied = _copy(store.root / name, to, at, known.get(name), private=name in _PRIVATE)
                 new += copied
-        _check_tables(to / changing, files)
+        _check_tables(store.root, to / changing, files)
         page: dict[str, Any] = {"wizen": __version__, "created": now.isoformat(timespec="seconds"), "files": files}
         seal.publish(to / _LIST, json.dumps(page, indent=1).encode())
         for old in (to / _CHANGING).iterdir():
@@ -184,23 +186,34 @@ def _listed(source: Path) -> dict[str, Any]:
         raise CorruptBackup(f"{source / _LIST} is damaged ({error}).", "Take another backup.") from error
 
 
-def _check_tables(changing: Path, files: Mapping[str, Any]) -> None:
-    """Refuse a copy in whose making a generation was pruned.
+def _check_tables(root: Path, changing: Path, files: Mapping[str, Any]) -> None:
+    """Refuse a copy in whose making a generation was pruned; a table that is damaged in the store is so in the copy.
 
     Raises:
         CorruptBackup: it was.
 
     """
     for page in changing.glob("tables/*/current.json"):
-        name = f"tables/{page.parent.name}/{json.loads(page.read_bytes()).get('file')}"
-        if name not in files:
+        table = page.parent.name
+        try:
+            name = f"tables/{table}/{read_manifest(changing / 'tables', table).file}"
+        except (CorruptTable, UnknownTable):
+            continue
+        if name not in files and not _is_still(page, root / "tables" / table / page.name):
             raise CorruptBackup(f"{name} went away while it was copied.", "Copy again.")
+
+
+def _is_still(copied: Path, source: Path) -> bool:
+    try:
+        return copied.read_bytes() == source.read_bytes()
+    except FileNotFoundError:
+        return False
 
 
 def _names(root: Path, patterns: Sequence[str]) -> Iterator[str]:
     for pattern in patterns:
         for path in root.glob(pattern):
-            if not path.name.startswith("."):
+            if path.is_file():
                 yield path.relative_to(root).as_posix()
 
 
@@ -209,12 +222,11 @@ def _copy(
 ) -> tuple[dict[str, Any], bool]:
     """Copy a file to `at` below `root` unless it is there; return what is listed of it, and whether it was copied.
 
-    Only results and generations are taken for the same by their size: they never change.
+    Only results and generations are taken for what they were: they never change.
     """
     to = root / at
     try:
-        size = source.stat().st_size
-        if known is not None and at.endswith(".h5") and to.is_file() and to.stat().st_size == size == known["bytes"]:
+        if known is not None and at.endswith(".h5") and _is_sound(to, known) and _is_no_better(source, known):
             return known, False
         data = source.read_bytes()
     except FileNotFoundError:
@@ -223,6 +235,19 @@ def _copy(
         temporary.write_bytes(data)
         seal.adopt(temporary, to)
     return {"at": at, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}, True
+
+
+def _is_sound(copied: Path, known: Mapping[str, Any]) -> bool:
+    """Return whether a sealed file in a backup is what was copied, and was whole when it was."""
+    if not copied.is_file() or copied.stat().st_size != known["bytes"]:
+        return False
+    with copied.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest() == known["sha256"] and seal.is_whole(copied)
+
+
+def _is_no_better(source: Path, known: Mapping[str, Any]) -> bool:
+    """Return whether a sound copy need not be made again: what has another size is another file, or was cut short."""
+    return source.stat().st_size == known["bytes"] or not seal.is_whole(source)
 
 
 def _copy_ledger(store: Store, root: Path, at: str) -> dict[str, Any]:

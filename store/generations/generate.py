@@ -117,7 +117,7 @@ def write(
     ):
         if dtype == "int16":
             whole = [block.astype(np.float32) for block in blocks()]
-            codes = packed.encode(whole)
+            codes = _encoded(whole)
             file.dimensions = dict(zip(PACKED, codes.codes.shape, strict=True))
             target = _spectrum(file, PACKED, dtype)
             _state_loss(target, np.add(packed.loss(whole, codes), source.lost))
@@ -140,6 +140,14 @@ def write(
     small.attrs["digest"] = content
     _append(path, small)
     return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
+
+
+def _encoded(whole: list[Array]) -> packed.Codes:
+    """Pack spectra; of those that are all zero one wave is kept, for what has no bytes cannot be mapped."""
+    codes = packed.encode(whole)
+    if codes.place.size:
+        return codes
+    return codes._replace(codes=np.zeros((*codes.codes.shape[:2], 1), np.int16), place=np.zeros(1, np.int32))
 
 
 def _append(path: Path, small: xr.Dataset) -> None:

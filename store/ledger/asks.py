@@ -15,10 +15,14 @@ from .database import Database
 
 __all__ = ["Ask", "Asker", "Spending", "asks", "check", "note"]
 
-#: What an ask is charged with: what its run took, else what it is expected to take once it was or will be begun.
+#: The asks of one somebody since a time; `after` are the claims by the time of the next one for the same job.
+_ASKS = "(SELECT *, lead(claims) OVER (PARTITION BY key ORDER BY rowid) AS after FROM asks WHERE {} = ? AND at > ?)"
+#: What an ask is charged with: what its run took, else what it is expected to take once it was or will be begun, which
+#: claims tell: they never go back. What was asked for again is charged again if it was begun, for then it began anew.
 _CHARGE = (
-    "CASE WHEN jobs.state = 'done' THEN coalesce(jobs.seconds, asks.expected) "
-    "WHEN jobs.state = 'cancelled' AND jobs.attempts = 0 THEN 0 ELSE asks.expected END"
+    "CASE WHEN asks.after > asks.claims THEN asks.expected WHEN asks.after IS NOT NULL THEN 0 "
+    "WHEN jobs.state = 'done' THEN coalesce(jobs.seconds, asks.expected) "
+    "WHEN jobs.state = 'cancelled' AND jobs.claims = asks.claims THEN 0 ELSE asks.expected END"
 )
 
 
@@ -56,8 +60,11 @@ class Ask(NamedTuple):
 
 def note(connection: Connection, key: str, asker: Asker, expected: float) -> None:
     """Note within a transaction that somebody asked for a run that is expected to take so many seconds."""
-    row = (key, asker.id, asker.name, asker.client, time.time(), expected)
-    connection.execute("INSERT INTO asks VALUES (?, ?, ?, ?, ?, ?)", row)
+    row = (asker.id, asker.name, asker.client, time.time(), expected, key)
+    # of a run that goes on already, its asker has a part
+    connection.execute(
+        "INSERT INTO asks SELECT key, ?, ?, ?, ?, ?, claims - (state = 'running') FROM jobs WHERE key = ?", row
+    )
 
 
 def check(connection: Connection, asker: Asker, expected: float, spending: Spending) -> None:
@@ -71,10 +78,9 @@ def check(connection: Connection, asker: Asker, expected: float, spending: Spend
     for column, who, most in (("token", asker.id, spending.token), ("client", asker.client, spending.client)):
         if most is None or not who:
             continue
-        # a job that was asked for twice is run once
         rows = connection.execute(
-            f"SELECT max(asks.at), {_CHARGE} FROM asks JOIN jobs ON jobs.key = asks.key "
-            f"WHERE asks.{column} = ? AND asks.at > ? GROUP BY asks.key ORDER BY 1",
+            f"SELECT asks.at, {_CHARGE} FROM {_ASKS.format(column)} AS asks "
+            "JOIN jobs ON jobs.key = asks.key ORDER BY asks.at",
             (who, since),
         ).fetchall()
         spent = sum(charge for _, charge in rows)

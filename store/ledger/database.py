@@ -80,6 +80,7 @@ class Database:
         Raises:
             CorruptLedger: the file is no database, or one of another version.
             NetworkFileSystem: it is where locks do not hold.
+            StorageFailed: the disk does not work, or another program keeps the file locked.
 
         """
         with self._transaction("DEFERRED") as connection:
@@ -93,7 +94,7 @@ class Database:
             CorruptLedger: the file is no database, or one of another version.
             ReadOnlyStore: it may not be written.
             StorageFull: the disk is full.
-            StorageFailed: it does not work.
+            StorageFailed: it does not work, or another program keeps the file locked.
 
         """
         with self._transaction("IMMEDIATE") as connection:
@@ -155,6 +156,9 @@ class Database:
             name = getattr(error, "sqlite_errorname", "")
             if name == "SQLITE_FULL":
                 raise StorageFull(f"there is no space left to write {self._path}.", "Free space and go on.") from error
+            if name.startswith(("SQLITE_BUSY", "SQLITE_LOCKED")):
+                advice = "End the program that has it open and does not go on; then run the same command again."
+                raise StorageFailed(f"another program keeps {self._path} locked.", advice) from error
             if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN", "SQLITE_IOERR")):
                 ask_the_system(self._path)
             if name.startswith(("SQLITE_READONLY", "SQLITE_CANTOPEN")):

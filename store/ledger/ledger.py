@@ -33,6 +33,7 @@ __all__ = ["MAX_LOST", "Ledger"]
 MAX_LOST = 5
 #: The claim that a job's worker holds, or gave back without anybody having taken the job since.
 _HELD = "key = ? AND claims = ? AND (worker = ? OR worker IS NULL AND state = 'wanted')"
+_RUNS = "state = 'running'"
 
 _LOST = {
     "code": "worker-lost",
@@ -147,12 +148,21 @@ class Ledger:
         return state if changed else None
 
     def release(self, job: Job) -> bool:
-        """Put a claimed job back as if it had not been claimed: its worker was asked to stop, or is dead.
+        """Put a claimed job back as if it had not been claimed: its worker was asked to stop.
 
         False means that the job is no longer its claimant's, and is left alone.
         """
         change = "state = 'wanted', attempts = max(attempts - 1, 0), progress = 0, worker = NULL"
-        return self._end(job, change, only="state = 'running'")
+        return self._end(job, change, only=_RUNS)
+
+    def lost(self, job: Job) -> bool:
+        """Put a claimed job back whose worker is dead, or give it up: it may be what took its workers down.
+
+        False means that the job is no longer its claimant's, and is left alone.
+        """
+        if job.attempts >= MAX_LOST:
+            return self._end(job, "state = 'failed', error = ?, worker = NULL", json.dumps(_LOST), only=_RUNS)
+        return self._end(job, "state = 'wanted', progress = 0, worker = NULL", only=_RUNS)
 
     def cancel(self, keys: Iterable[str]) -> int:
         """Give up jobs that wait or run; return how many. A running worker learns of it when it renews."""

@@ -15,12 +15,9 @@ from . import asks
 from .asks import Asker, Spending
 from .jobs import Job, JobSpec, State, read_row
 from .ledger import Ledger
-from .rows import SELECT, enter, get
+from .rows import QUEUE, SELECT, enter, get
 
-__all__ = ["PLAN", "Queue", "Quota"]
-
-#: The plan of all jobs in the queue; `queue:<owner>` is that of one asker.
-PLAN = "queue"
+__all__ = ["Queue", "Quota"]
 
 
 @dataclass(frozen=True)
@@ -70,7 +67,7 @@ class Queue:
             if adds and quota is not None:
                 _check(connection, mine, quota)
                 asks.check(connection, asker, expected, quota.spending)
-            new = enter(connection, job, PLAN, revived)
+            new = enter(connection, job, QUEUE, revived)
             connection.execute("INSERT OR IGNORE INTO plans VALUES (?, ?)", (mine, job.key))
             if adds:
                 asks.note(connection, job.key, asker, expected)
@@ -95,9 +92,9 @@ class Queue:
 
     def _leave(self, connection: Connection, key: str, owner: str) -> None:
         connection.execute("DELETE FROM plans WHERE plan = ? AND key = ?", (_plan(owner), key))
-        others = {row[0] for row in connection.execute("SELECT plan FROM plans WHERE key = ?", (key,))} - {PLAN}
+        others = {row[0] for row in connection.execute("SELECT plan FROM plans WHERE key = ?", (key,))} - {QUEUE}
         if not any(plan.startswith(_plan("")) for plan in others):
-            connection.execute("DELETE FROM plans WHERE plan = ? AND key = ?", (PLAN, key))
+            connection.execute("DELETE FROM plans WHERE plan = ? AND key = ?", (QUEUE, key))
         if not others:
             connection.execute(
                 "UPDATE jobs SET state = 'cancelled', worker = NULL, lease_until = NULL, updated = ? WHERE key = ?",
@@ -110,7 +107,7 @@ class Queue:
             rows = connection.execute(
                 f"{SELECT} WHERE state IN ('wanted', 'running') AND jobs.key IN "
                 "(SELECT key FROM plans WHERE plan = ?) ORDER BY created, jobs.rowid",
-                (PLAN,),
+                (QUEUE,),
             )
             return [read_row(row) for row in rows]
 
@@ -136,7 +133,7 @@ class Queue:
 
 
 def _plan(owner: str) -> str:
-    return f"{PLAN}:{owner}"
+    return f"{QUEUE}:{owner}"
 
 
 def _has(connection: Connection, plan: str, key: str) -> bool:
@@ -155,5 +152,5 @@ def _open(connection: Connection, plan: str) -> int:
 def _check(connection: Connection, mine: str, quota: Quota) -> None:
     if _open(connection, mine) >= quota.own:
         raise QueueFull(f"{quota.own} of your jobs wait or run already.", "Wait for one to end, or cancel one.")
-    if _open(connection, PLAN) >= quota.total:
+    if _open(connection, QUEUE) >= quota.total:
         raise QueueFull(f"{quota.total} jobs wait or run already.", "Wait for some to end.")

@@ -19,9 +19,14 @@ __all__ = ["rebuild"]
 def rebuild(database: Database, results: Iterable[xr.Dataset]) -> int:
     """Make a ledger's file say what results say; return how many there are.
 
-    Each becomes a done job; a job noted as done whose result is not among them waits again.
+    Each becomes a done job; a job noted as done whose result is not among them waits again. What ends meanwhile stays:
+    its result may have come after those that were listed.
     """
-    good: list[str] = []
+    with database.read() as connection:
+        gone = {
+            row["key"]: row["claims"] for row in connection.execute("SELECT key, claims FROM jobs WHERE state = 'done'")
+        }
+    count = 0
     for dataset in results:
         attrs, now = dataset.attrs, time.time()
         key = attrs["key"]
@@ -44,11 +49,12 @@ def rebuild(database: Database, results: Iterable[xr.Dataset]) -> int:
                     now,
                 ),
             )
-        good.append(key)
+        gone.pop(key, None)
+        count += 1
     with database.write() as connection:
-        connection.execute(
+        connection.executemany(
             "UPDATE jobs SET state = 'wanted', attempts = 0, failures = 0, digest = NULL, progress = 0, "
-            "updated = ? WHERE state = 'done' AND key NOT IN (SELECT value FROM json_each(?))",
-            (time.time(), json.dumps(good)),
+            "updated = ? WHERE state = 'done' AND key = ? AND claims = ?",
+            [(time.time(), *claim) for claim in gone.items()],
         )
-    return len(good)
+    return count

@@ -11,7 +11,10 @@ from ..canonical import canonical
 from ..errors import UnknownJob
 from .jobs import Job, JobSpec, State, read_row
 
-__all__ = ["SELECT", "among", "enter", "get"]
+__all__ = ["QUEUE", "SELECT", "among", "enter", "get"]
+
+#: The plan of all jobs that are asked for one by one, see `queue`; `queue:<owner>` is that of one asker.
+QUEUE = "queue"
 
 #: Reads whole jobs.
 SELECT = "SELECT jobs.*, notes.message FROM jobs LEFT JOIN notes ON notes.key = jobs.key"
@@ -20,7 +23,7 @@ SELECT = "SELECT jobs.*, notes.message FROM jobs LEFT JOIN notes ON notes.key = 
 def enter(connection: Connection, job: JobSpec, plan: str, revived: Sequence[State]) -> int:
     """Ask for a job within a transaction; return 1 if it waits now and did not before.
 
-    A job in one of the states `revived` waits again.
+    A job in one of the states `revived` waits again, for who asks now: what others had asked for one by one has ended.
     """
     now = time.time()
     texts = canonical(job.params).decode(), canonical(job.need).decode()
@@ -31,6 +34,9 @@ def enter(connection: Connection, job: JobSpec, plan: str, revived: Sequence[Sta
         f"updated = excluded.updated WHERE state IN ({','.join('?' * len(revived))})",
         (job.key, job.solver, job.version, *texts, plan, now, now, *revived),
     ).rowcount
+    if count:
+        ended = job.key, QUEUE, f"{QUEUE}:*"
+        connection.execute("DELETE FROM plans WHERE key = ? AND (plan = ? OR plan GLOB ?)", ended)
     if plan:
         connection.execute("INSERT OR IGNORE INTO plans VALUES (?, ?)", (plan, job.key))
     return count

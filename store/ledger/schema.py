@@ -15,10 +15,10 @@ CREATE INDEX IF NOT EXISTS jobs_state ON jobs (state, created);
 CREATE TABLE IF NOT EXISTS plans (plan TEXT, key TEXT, PRIMARY KEY (plan, key)) WITHOUT ROWID;
 -- what a running job says of itself
 CREATE TABLE IF NOT EXISTS notes (key TEXT PRIMARY KEY, message TEXT NOT NULL) WITHOUT ROWID;
--- who asked for it over HTTP, and how long it was expected to take, without secrets
+-- who asked for it over HTTP, how long it was expected to take, without secrets, and how many claims had ended by then
 CREATE TABLE IF NOT EXISTS asks (
     key TEXT NOT NULL, token TEXT NOT NULL, name TEXT NOT NULL, client TEXT NOT NULL, at REAL NOT NULL,
-    expected REAL NOT NULL
+    expected REAL NOT NULL, claims INTEGER NOT NULL DEFAULT 0
 );
 CREATE INDEX IF NOT EXISTS asks_at ON asks (at);
 -- live sessions: whose, what they have cost [s], and until when they are counted as open, by which clock
@@ -33,4 +33,8 @@ UPGRADES = {
     1: "ALTER TABLE jobs ADD COLUMN claims INTEGER NOT NULL DEFAULT 0; "
     "ALTER TABLE jobs ADD COLUMN clock TEXT; ALTER TABLE jobs ADD COLUMN lease REAL",
     2: "ALTER TABLE jobs ADD COLUMN failures INTEGER NOT NULL DEFAULT 0",
+    # files that were begun before anybody could ask have no such table
+    3: "CREATE TABLE IF NOT EXISTS asks (key TEXT NOT NULL, token TEXT NOT NULL, name TEXT NOT NULL, "
+    "client TEXT NOT NULL, at REAL NOT NULL, expected REAL NOT NULL); "
+    "ALTER TABLE asks ADD COLUMN claims INTEGER NOT NULL DEFAULT 0",
 }

@@ -21,6 +21,7 @@ from solver import registry
 from solver.contract import InvalidGeometry, InvalidInput, Need, Params, Solver
 from store import starter
 from store.ledger.jobs import JobSpec
+from store.ledger.rows import QUEUE
 
 from ..errors import PlanError
 from . import planfile
@@ -37,6 +38,10 @@ class Plan:
     `axes` are the names that vary; `skipped` counts the impossible combinations that were left out, `repeated` the
     samples that were listed more than once. `first` is the plan of the pattern that the samples start from, `controls`
     that of the samples that are run without it as well.
+
+    Raises:
+        PlanError: it is called as the jobs that are asked for one by one are in the ledger.
+
     """
 
     name: str
@@ -48,6 +53,11 @@ class Plan:
     repeated: int = 0
     first: Plan | None = None
     controls: Plan | None = None
+
+    def __post_init__(self) -> None:
+        if self.name.partition(":")[0] == QUEUE:
+            said = f"no plan may be called {self.name!r}: so are the jobs that are asked for over HTTP."
+            raise PlanError(said, "Say another `name` in it, or rename its file.")
 
     @classmethod
     def load(cls, path: Path | str) -> Self:

@@ -33,7 +33,8 @@ class _Call(NamedTuple):
 class Processes(Executor):
     """`count` processes, started with their first call; each call runs alone in one of them.
 
-    A process that dies fails the one call that it ran, with `BrokenExecutor`, and is replaced.
+    A process that dies, or whose answer cannot be read, fails the one call that it ran, with `BrokenExecutor`, and is
+    replaced.
     """
 
     def __init__(self, count: int) -> None:
@@ -94,6 +95,9 @@ class Processes(Executor):
             except (OSError, EOFError):
                 result, error = None, BrokenExecutor("the worker process died")
                 process = pipe = None
+            except Exception as unread:  # whatever unpickling comes to: who waits for the call must hear of it
+                result, error = None, BrokenExecutor(f"the answer of a worker process cannot be read ({unread!r})")
+                process = pipe = None
             if error is None:
                 call.future.set_result(result)
             else:
@@ -112,7 +116,7 @@ class Processes(Executor):
                 raise EOFError
             answer: tuple[Any, BaseException | None] = pickle.loads(pipe.recv_bytes())
             return answer
-        except (OSError, EOFError):
+        except Exception:
             process.kill()
             process.join()
             raise
@@ -150,8 +154,10 @@ def _serve(pipe: Connection, parent: int) -> None:
 
 def _failure(error: BaseException) -> bytes:
     try:
-        return pickle.dumps((None, error))
-    except Exception:  # an error that cannot travel
+        said = pickle.dumps((None, error))
+        pickle.loads(said)
+        return said
+    except Exception:  # an error that cannot travel, or that would not arrive
         return pickle.dumps((None, RuntimeError(f"{type(error).__name__}: {error}")))
 
 

@@ -120,11 +120,12 @@ class Run:
         if not self._shares_ledger:
             (self._store.root / self._sharing()).unlink()
 
-    def _free(self, jobs: Iterable[Job]) -> None:
-        """Take back jobs of runners that are known to be dead."""
-        for job in jobs:
-            if job.state == "running" and self._place.knows_dead(job.worker):
-                self._ledger.release(job)
+    def _free(self, jobs: Iterable[Job]) -> bool:
+        """Take back jobs of runners that are known to be dead; return whether there were any."""
+        dead = [job for job in jobs if job.state == "running" and self._place.knows_dead(job.worker)]
+        for job in dead:
+            self._ledger.lost(job)
+        return bool(dead)
 
     def _prepare(self, again: bool) -> None:
         """Enter the jobs, take back those of dead runners, and make the ledger agree with the shards."""
@@ -133,7 +134,8 @@ class Run:
         if any(job.state == "done" and not self._store.has(job.key) for job in before.values()):
             self._ledger.rebuild(self._store.results())  # shards were deleted by hand
             before = self._states()
-        self._free(before.values())
+        if self._free(before.values()):
+            before = self._states()  # what took its runners down too often was given up
         self._finished = {key for key, job in before.items() if job.state in ("done", "failed")}
 
     def _launch(self) -> None:

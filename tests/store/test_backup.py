@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 
 from solver.dehydration import SOLVER
-from store import tables
+from store import shards, tables
 from store.copies import backup as copies
 from store.copies.backup import backup, restore
-from store.errors import CorruptBackup, CorruptLedger, MissingStore, ReadOnlyStore, StorageFull
+from store.errors import CorruptBackup, CorruptLedger, CorruptTable, MissingStore, ReadOnlyStore, StorageFull
 from store.store import Store
 from store.tokens import Tokens
 
@@ -29,6 +29,7 @@ def own(tmp_path: Path) -> Store:
     fill(store, te=[0.03, 0.04], resolution=8)
     tables.build(store, SOLVER)
     Tokens(store.root).create("mine", ["run"])
+    store.keep_plan("plums", "# a plan")
     return store
 
 
@@ -47,6 +48,7 @@ def test_there_and_back(own: Store, tmp_path: Path) -> None:
     assert not again.ledger.release(running), "a claim of the other store means nothing"
     tables.open(again).close()
     assert [token.name for token in Tokens(again.root).all()] == ["mine"]
+    assert again.plan("plums") == "# a plan"
     assert (again.root / "tokens.json").stat().st_mode & 0o077 == 0
     (secrets,) = (tmp_path / "copy").rglob("tokens.json")
     assert secrets.stat().st_mode & 0o077 == 0
@@ -57,8 +59,8 @@ def test_a_second_backup_copies_what_is_new(own: Store, tmp_path: Path) -> None:
     fill(own, te=[0.05], resolution=8)
     second = backup(own, tmp_path / "copy")
     assert second.files == first.files + 1
-    # the new shard, the manifest and the tokens
-    assert second.new == 3
+    # the new shard, the manifest, the plan and the tokens
+    assert second.new == 4
     assert len(list((tmp_path / "copy" / "changing").iterdir())) == 1
     restore(tmp_path / "copy", tmp_path / "again")
     assert len(list(Store.open(tmp_path / "again").results())) == 3
@@ -249,3 +251,77 @@ def test_a_store_is_restored_where_one_stands_and_behind_a_link(
     for place in ("here", "there", "link"):
         assert len(list(Store.open(tmp_path / place).results())) == 2
     assert (tmp_path / "link").is_symlink()
+
+
+def flip(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[100] ^= 1
+    path.write_bytes(data)
+
+
+def test_another_backup_repairs_what_was_damaged(own: Store, tmp_path: Path) -> None:
+    backup(own, tmp_path / "copy")
+    first, second = sorted((tmp_path / "copy").glob("shards/*/*.h5"))
+    flip(first)
+    second.unlink()
+    assert backup(own, tmp_path / "copy").new == 2 + 3  # and what changes
+    restore(tmp_path / "copy", tmp_path / "again")
+    assert len(list(Store.open(tmp_path / "again").results())) == 2
+
+
+def test_a_result_that_was_healed_since_replaces_its_damaged_copy(own: Store, tmp_path: Path) -> None:
+    """And a sound copy is not given up for a result that is damaged now."""
+    key, result = make(te=0.03, resolution=8)
+    flip(own.shard_path(key))
+    backup(own, tmp_path / "copy")
+    own.put(key, result)
+    backup(own, tmp_path / "copy")
+    for damage in (flip, lambda path: path.write_bytes(path.read_bytes()[:200])):
+        damage(own.shard_path(key))
+        backup(own, tmp_path / "copy")
+    restore(tmp_path / "copy", tmp_path / "again")
+    assert Store(tmp_path / "again").get(key).attrs["digest"] == shards.digest(result)
+
+
+def test_a_store_in_which_nothing_changes(tmp_path: Path) -> None:
+    """Neither ledger nor tables nor tokens."""
+    store = Store.open(tmp_path / "store", create=True)
+    key, result = make(te=0.03, resolution=8)
+    store.put(key, result)
+    assert backup(store, tmp_path / "copy").files == 1
+    restore(tmp_path / "copy", tmp_path / "again")
+    assert list(Store.open(tmp_path / "again").keys()) == [key]
+
+
+@pytest.mark.parametrize("damage", ['{"a":', "[]", '{"file": "x.h5"}', "gone"])
+def test_one_damaged_table_stops_no_backup(own: Store, tmp_path: Path, damage: str) -> None:
+    tables.build(own, SOLVER, "other")
+    if damage == "gone":
+        tables.path_of(own, tables.info(own)).unlink()
+    else:
+        (own.tables_dir / "default" / "current.json").write_text(damage)
+    backup(own, tmp_path / "copy")
+    restore(tmp_path / "copy", tmp_path / "again")
+    again = Store.open(tmp_path / "again")
+    tables.open(again, "other").close()
+    with pytest.raises((CorruptTable, FileNotFoundError)):
+        tables.open(again)
+
+
+def test_a_generation_that_is_pruned_meanwhile_is_missed(
+    own: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    copy = copies._copy
+
+    def meanwhile(source: Path, *values: Any, **named: Any) -> Any:
+        found = copy(source, *values, **named)
+        if source.name == "current.json":
+            tables.rebuild(own, SOLVER, dtype="float64")
+            tables.prune(own)
+        return found
+
+    with monkeypatch.context() as patch:
+        patch.setattr(copies, "_copy", meanwhile)
+        with pytest.raises(CorruptBackup, match="went away"):
+            backup(own, tmp_path / "copy")
+    backup(own, tmp_path / "copy")

@@ -5,19 +5,23 @@ import pickle
 import sqlite3
 import threading
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+import xarray as xr
 
-from store.errors import CorruptLedger, UnknownJob
-from store.ledger import clock, jobs
+from store.errors import CorruptLedger, QuotaSpent, StorageFailed, UnknownJob
+from store.ledger import clock, database, jobs
+from store.ledger.asks import Asker, Spending, asks
 from store.ledger.clock import Clock
 from store.ledger.jobs import Job, JobSpec
 from store.ledger.ledger import MAX_LOST, Ledger
+from store.ledger.queue import Queue, Quota
 from store.store import Store
 
-from .conftest import fill, python, spec
+from .conftest import fill, make, python, spec
 
 ERROR = {"code": "unstable", "message": "blew up.", "advice": "Smaller steps."}
 
@@ -193,6 +197,20 @@ def test_a_job_that_kills_its_workers_is_given_up(ledger: Ledger) -> None:
     assert lost.error["code"] == "worker-lost"
 
 
+def test_a_job_whose_runners_die_is_given_up(ledger: Ledger) -> None:
+    """Whoever knows that a runner is dead says so at once, and the attempt counts as if its lease had run out."""
+    ledger.want([job("a")])
+    for attempt in range(1, MAX_LOST + 1):
+        held = claim(ledger)
+        assert held.attempts == attempt
+        assert ledger.lost(held)
+        assert not ledger.lost(held)
+    found = ledger.get("a")
+    assert (found.state, found.worker) == ("failed", None)
+    assert found.error is not None
+    assert found.error["code"] == "worker-lost"
+
+
 def test_claims_among_keys_and_plans_that_share_jobs(ledger: Ledger) -> None:
     ledger.want([job("a"), job("b")], plan="p")
     ledger.want([job("b"), job("c")], plan="q")
@@ -322,6 +340,81 @@ def test_rebuilding_takes_back_what_is_gone(store: Store) -> None:
     assert [store.ledger.get(name).state for name in keys] == ["done", "wanted"]
 
 
+def test_what_ends_while_a_ledger_is_rebuilt_stays(store: Store) -> None:
+    """Its shard may have come after those that were listed; and so may one that was missing before."""
+    (gone,) = fill(store, te=[0.03], resolution=8)
+    store.shard_path(gone).unlink()
+    keys = {name: (spec(te=te, resolution=8), make(te=te, resolution=8)[1]) for name, te in ((gone, 0.03), ("b", 0.04))}
+    store.ledger.want([keys["b"][0]])
+
+    def meanwhile() -> Iterator[xr.Dataset]:
+        yield from store.results()
+        Queue(store.ledger).ask(keys[gone][0], "w", lost=True)
+        for asked, result in keys.values():
+            held = store.ledger.claim("w", 60.0, [asked.key])
+            assert held is not None
+            assert store.ledger.done(held, store.put(asked.key, result), 1.0)
+
+    assert store.ledger.rebuild(meanwhile()) == 0
+    assert store.ledger.counts()["done"] == 2
+    assert all(found.digest for found in store.ledger.jobs())
+
+
+def test_every_run_that_was_begun_is_charged(ledger: Ledger) -> None:
+    """Taken back and asked for again it begins anew; what was never begun costs nothing, however often it is asked."""
+    queue, asker, quota = Queue(ledger), Asker("t"), Quota(9, 9, Spending(token=100.0))
+    for _ in range(5):
+        queue.ask(job("a"), asker, quota, expected=40.0)
+        queue.withdraw("a", asker.id)
+    for _ in range(2):
+        queue.ask(job("a"), asker, quota, expected=40.0)
+        claim(ledger)
+        queue.withdraw("a", asker.id)
+    with pytest.raises(QuotaSpent, match="asked for 80 s"):
+        queue.ask(job("a"), asker, quota, expected=40.0)
+    queue.ask(job("b"), asker, quota, expected=20.0)
+    queue.withdraw("b", asker.id)
+    # a run that goes on is paid once by each who has asked for it, and by what it took
+    queue.ask(job("b"), asker, quota, expected=20.0)
+    running = claim(ledger)
+    other = Asker("u", client="here")
+    queue.ask(job("b"), other, Quota(9, 9, Spending(token=30.0)), expected=20.0)
+    queue.withdraw("b", asker.id)
+    queue.ask(job("b"), asker, expected=20.0)
+    assert ledger.done(running, "d", 15.0)
+    with pytest.raises(QuotaSpent, match="asked for 95 s"):
+        queue.ask(job("c"), asker, quota, expected=40.0)
+    with pytest.raises(QuotaSpent, match="asked for 15 s"):
+        queue.ask(job("c"), other, Quota(9, 9, Spending(token=30.0)), expected=40.0)
+
+
+@pytest.mark.parametrize("end", ["cancelled", "failed"])
+def test_who_asked_before_a_job_ended_has_no_part_in_the_next(ledger: Ledger, end: str) -> None:
+    queue = Queue(ledger)
+    queue.ask(job("a"), "first")
+    if end == "cancelled":
+        ledger.cancel(["a"])
+    else:
+        assert ledger.failed(claim(ledger), ERROR, 1) == "failed"
+    queue.ask(job("a"), "second", again=True)
+    assert not queue.withdraw("a", "first")[1]
+    assert queue.withdraw("a", "second")[0].state == "cancelled"
+    # nor is a sweep's job the queue's
+    ledger.want([job("a")], "sweep")
+    assert queue.waiting() == []
+
+
+def test_a_ledger_that_another_program_keeps_locked_is_said(ledger: Ledger, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(database, "_PATIENCE", 0.05)
+    ledger.want([job("a")])
+    with contextlib.closing(sqlite3.connect(ledger.path, isolation_level=None)) as other:
+        other.execute("BEGIN IMMEDIATE")
+        with pytest.raises(StorageFailed, match="keeps"):
+            ledger.want([job("b")])
+        assert ledger.counts()["wanted"] == 1
+    ledger.want([job("b")])
+
+
 def test_an_older_file_gains_what_was_added_since(tmp_path: Path) -> None:
     path = tmp_path / "ledger.sqlite"
     Ledger(path).counts()
@@ -350,15 +443,16 @@ def test_a_ledger_of_the_first_version_is_upgraded(tmp_path: Path) -> None:
     with contextlib.closing(sqlite3.connect(path)) as connection:
         connection.executescript(_FIRST)
     upgraded = Ledger(path, counter.clock)
+    assert asks(upgraded.database) == []
     assert [(j.key, j.state, j.claims) for j in upgraded.jobs()] == [("a", "done", 0), ("b", "running", 0)]
     # its leases were dates: they are watched, like those of another clock
     assert upgraded.claim("w", 30.0) is None
     counter.seconds = 100.0
     assert claim(upgraded).key == "b"
     with contextlib.closing(sqlite3.connect(path)) as connection:
-        assert connection.execute("PRAGMA user_version").fetchone() == (3,)
-        connection.execute("PRAGMA user_version = 4")
-    with pytest.raises(CorruptLedger, match="version 4"):
+        assert connection.execute("PRAGMA user_version").fetchone() == (4,)
+        connection.execute("PRAGMA user_version = 5")
+    with pytest.raises(CorruptLedger, match="version 5"):
         Ledger(path).counts()
 
 
@@ -384,3 +478,17 @@ def test_what_jobs_are_of_is_read_when_it_is_wanted(ledger: Ledger, monkeypatch:
     assert found.params["te"] == 0.04
     assert read.count('{"te":0.04}') == 1
     assert pickle.loads(pickle.dumps(found)) == found
+
+
+def test_asks_of_an_older_file_are_kept(tmp_path: Path) -> None:
+    """They say nothing of claims: what was begun since the file began counts for the last of them."""
+    path = tmp_path / "ledger.sqlite"
+    Queue(Ledger(path)).ask(job("a"), Asker("t"), expected=40.0)
+    with contextlib.closing(sqlite3.connect(path)) as connection:
+        connection.execute("ALTER TABLE asks DROP COLUMN claims")
+        connection.execute("PRAGMA user_version = 3")
+        connection.commit()
+    upgraded = Ledger(path)
+    with pytest.raises(QuotaSpent, match="asked for 40 s"):
+        Queue(upgraded).ask(job("b"), Asker("t"), Quota(9, 9, Spending(token=50.0)), expected=20.0)
+    assert len(asks(upgraded.database)) == 1

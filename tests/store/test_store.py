@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from store import holding, seal
-from store.errors import CorruptShard, MissingStore, StoreError, UnknownJob
+from store.errors import CorruptShard, MissingStore, ReadOnlyStore, StoreError, UnknownJob
 from store.store import Store
 
 from .conftest import make, python
@@ -145,3 +145,11 @@ def test_kill_nine_loses_nothing_that_was_done(tmp_path: Path) -> None:
         assert store.get(name).attrs["key"] == name
     assert store.ledger.rebuild(store.results()) == len(visible)
     assert {job.key for job in store.ledger.jobs("done")} == visible
+
+
+def test_a_file_where_a_store_should_be(tmp_path: Path) -> None:
+    place = tmp_path / "file"
+    place.touch()
+    for root in (place, place / "below"):
+        with pytest.raises(ReadOnlyStore, match="no directory"):
+            Store.open(root, create=True)

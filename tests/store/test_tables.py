@@ -4,6 +4,9 @@ import json
 import shutil
 import subprocess
 import sys
+import threading
+import time
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -271,3 +274,51 @@ def test_full_disk_while_writing_leaves_nothing(store: Store, tmp_path: Path) ->
     command = [unshare, "-rm", "sh", "-c", script, FULL]
     result = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=120)
     assert result.stdout.split() == ["storage-full"], result.stderr
+
+
+def test_two_rebuilds_at_once_lose_no_sample(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The second begins with what the first has made current, and nobody prunes in the middle."""
+    keys = fill(store, te=[0.03, 0.04], resolution=8)
+    tables.build(store, SOLVER)
+    more = fill(store, te=[0.05], resolution=8), fill(store, te=[0.06], resolution=8)
+    publish, waits, ended = tables.write_manifest, threading.Event(), list[str]()
+
+    def late(directory: Path, info: tables.TableInfo) -> None:
+        waits.set()
+        time.sleep(0.2)
+        assert ended == []
+        publish(directory, info)
+
+    def then(what: str, do: Callable[[], object]) -> threading.Thread:
+        def run() -> None:
+            do()
+            ended.append(what)
+
+        thread = threading.Thread(target=run)
+        thread.start()
+        return thread
+
+    with monkeypatch.context() as patch:
+        patch.setattr(tables, "write_manifest", late)
+        threads = [then("first", lambda: tables.rebuild(store, SOLVER, more=more[0]))]
+        assert waits.wait(60)
+        patch.setattr(tables, "write_manifest", publish)
+        threads += [then("prune", lambda: tables.prune(store))]
+        threads += [then("second", lambda: tables.rebuild(store, SOLVER, more=more[1]))]
+        for thread in threads:
+            thread.join(60)
+    assert sorted(ended) == ["first", "prune", "second"]
+    assert set(tables.info(store).keys) == {*keys, *more[0], *more[1]}
+    tables.open(store).close()
+
+
+def test_packed_shapes_that_do_not_move(store: Store) -> None:
+    """No wave is left of them; the table opens all the same."""
+    for te in (0.03, 0.04):
+        key, result = make(te=te, resolution=8)
+        store.put(key, result.assign(displacement=result.displacement * 0))
+    tables.build(store, SOLVER, dtype="int16")
+    shape = ShapeTable.open(store, surfaces=registry.surface).at({"te": 0.035}, 0.15)
+    assert shape.position is not None
+    assert np.isfinite(shape.position).all()
+    assert audit.verify(store) == []

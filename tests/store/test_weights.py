@@ -70,3 +70,10 @@ def test_left_out_from_both_sides() -> None:
     assert 0 not in corner.samples
     assert corner.weights.sum() == pytest.approx(1)
     assert len(samples.adjacent()) == 3 + 4
+
+
+@pytest.mark.parametrize("eta", [2.0, 28.0, 500.0])
+def test_samples_as_far_as_the_next_one_share_evenly(eta: float) -> None:
+    samples = Samples(np.array([[1.0, 1.0], [2.0, 1.0], [1.0, 2.0], [2.0, 2.0]]))
+    near = samples.weigh("scattered", np.array([2**0.5, 2**0.5]), 2, eta)
+    np.testing.assert_allclose(near.weights, 0.5)

@@ -82,7 +82,29 @@ def test_errors_come_back_from_a_process_whatever_they_are() -> None:
             workers.submit(divmod, 1, 0).result()
         with pytest.raises(RuntimeError, match="Stubborn: no"):
             workers.submit(_stubborn).result()
-        assert workers.submit(abs, -3).result() == 3
+        with pytest.raises(RuntimeError, match="Lossy: over"):
+            workers.submit(_lossy).result(60)
+        with pytest.raises(BrokenExecutor, match="cannot be read"):
+            workers.submit(Shut).result(60)
+        assert workers.submit(abs, -3).result(60) == 3
+
+
+class Lossy(Exception):
+    """Travels, and does not arrive."""
+
+    def __init__(self, what: str, where: str) -> None:
+        super().__init__(f"{what} {where}")
+
+
+def _lossy() -> None:
+    raise Lossy("over", "there")
+
+
+class Shut:
+    """A result that does not arrive."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return divmod, (1, 0)
 
 
 class Stubborn(Exception):

@@ -126,3 +126,16 @@ def test_a_sweep_ends_in_a_command_that_works(shrinking: Solves, tmp_path: Path,
     said = wizen("sweep", partly, "--store", tmp_path / "partly").stdout
     assert f"next: wizen results --store {tmp_path / 'partly'} --solver shrinking" in said
     assert "table build" not in said
+
+
+def test_words_may_consist_of_digits() -> None:
+    """A version, or a key: equal as they are written, but in the order of numbers."""
+    seventeen = {"version": "17", "key": "1" * 64}
+
+    def meets(text: str) -> bool:
+        return results._meets(seventeen, *results._condition(text))
+
+    for true in ("version=17", "version!=9", "version>9", "version<=17", f"key={'1' * 64}", f"key!={'1' * 63}2"):
+        assert meets(true), true
+    for false in ("version=9", "version!=17", "version<9", "version=17.0", f"key={'1' * 63}2"):
+        assert not meets(false), false

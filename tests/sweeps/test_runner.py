@@ -14,6 +14,7 @@ import pytest
 import xarray as xr
 from conftest import Solves
 
+from store.ledger.ledger import MAX_LOST
 from store.store import Store
 from sweeps.planning.plan import Plan
 from sweeps.running import executors
@@ -200,6 +201,23 @@ def test_a_dead_runner_is_noticed_at_once(shrinking: Solves, store: Store, write
     store.ledger.claim(Place.here().sign(gone.pid), lease=3600)
     with executors.serial() as workers:
         assert run_plan(plan, store, workers).complete
+
+
+def test_a_job_that_takes_its_runners_down_is_given_up(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan = Plan.load(write_plan())
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    deadly = plan.jobs()[0]
+    store.ledger.want([deadly])
+    stopped = threading.Event()
+    stopped.set()
+    with executors.serial() as workers:
+        for _ in range(MAX_LOST):
+            assert store.ledger.claim(Place.here().sign(gone.pid), 3600, [deadly.key]) is not None
+            run_jobs([deadly], store, workers, stop=stopped)
+        report = run_plan(plan, store, workers)
+    assert (report.solved, [failure.key for failure in report.failed]) == (5, [deadly.key])
+    assert report.failed[0].error["code"] == "worker-lost"
 
 
 def test_nothing_is_guessed_of_processes_elsewhere() -> None:
