@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from ..rounding import from_zero, towards_zero
 from .errors import OverBudget
 from .need import Need, Quality
 
@@ -36,9 +37,10 @@ def within(solver: Solver, samples: Sequence[Params], need: Need, seconds: float
         return
     runs = "this run" if len(samples) == 1 else f"these {len(samples)} runs"
     if time > seconds:
-        found = f"{runs} would take about {time:.0f} s, longer than the {seconds:g} s allowed."
+        found = f"{runs} would take about {from_zero(time)} s, longer than the {towards_zero(seconds, 4)} s allowed."
     else:
-        found = f"a run would need about {most / 1e9:.2g} GB, more than the {allowed / 1e9:.2g} GB there are."
+        need_gb, have_gb = from_zero(most / 1e9), towards_zero(allowed / 1e9)
+        found = f"a run would need about {need_gb} GB, more than the {have_gb} GB there are."
     raise OverBudget(found, advice=_cheaper(solver, samples, need, seconds, allowed))
 
 
@@ -53,7 +55,7 @@ def _cheaper(solver: Solver, samples: Sequence[Params], need: Need, seconds: flo
     for quality in reversed(order[: order.index(need.quality)]):
         time, most = _expected(solver, samples, need.model_copy(update={"quality": quality}))
         if (time <= seconds and most <= allowed) or quality == order[0]:
-            said = f"Quality {quality!r} would take about {time:.0f} s and {most / 1e9:.2g} GB"
+            said = f"Quality {quality!r} would take about {from_zero(time)} s and {from_zero(most / 1e9)} GB"
             return f"{said}; fewer or earlier stages less."
     return "Ask for fewer or earlier stages, or for less of the shape (mirrors, where the solver has them)."
 

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Self
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from .errors import InvalidGeometry, InvalidInput
-from .words import Place, advise, named, say
+from .words import SHORT, Place, advise, named, say
 
 __all__ = ["Params"]
 
@@ -38,13 +38,14 @@ class Params(BaseModel):
         """Validate `values`: full field names, and scalar axis names that override single entries.
 
         Raises:
-            InvalidInput: with one sentence per wrong value.
+            InvalidInput: with one sentence per wrong value, or a value that is given by two names.
             InvalidGeometry: when the values contradict each other.
 
         """
         values = named(values)
         for name in cls.no_axes.keys() & values.keys():
             raise InvalidInput(f"{name!r} cannot be set.", advice=cls.no_axes[name])
+        cls.check_given(values)
         plain = {k: v for k, v in values.items() if k not in cls.axes}
         known = {**cls.model_fields, **dict.fromkeys(cls.axes)}
         try:
@@ -73,6 +74,47 @@ class Params(BaseModel):
                 if name in values and name != field
             }
             raise kind(f"{say(error, known, typed)}.", advice=advise(error, typed)) from None
+
+    @classmethod
+    def check_given(cls, values: Mapping[str, Any]) -> None:
+        """Refuse what cannot be meant, whatever else is said: one value by two names, truth values for numbers.
+
+        Raises:
+            InvalidInput: there is such a one.
+
+        """
+        names: dict[tuple[str, int | None], str] = {}
+        for name, value in values.items():
+            other = names.setdefault(cls._place(name), name)
+            if other != name:
+                raise InvalidInput(f"a value is given twice, as {other} and {name}.", advice="Leave one of them out.")
+            several = value if isinstance(value, list | tuple) else (value,)
+            if any(isinstance(one, bool) for one in several) and cls._is_number(name):
+                raise InvalidInput(
+                    f"{name}: a truth value is no number (got {SHORT.repr(value)}).", advice=f"Give {name} a number."
+                )
+
+    @classmethod
+    def over(cls, base: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+        """Return `base` with `values` over it by whatever names: a field replaces its entries, an axis one of them."""
+        said = {cls._place(name) for name in values}
+        kept = {k: v for k, v in base.items() if not said & {cls._place(k), (cls._place(k)[0], None)}}
+        return {**kept, **values}
+
+    @classmethod
+    def _place(cls, name: str) -> tuple[str, int | None]:
+        """Return the field that a name means, and which of its entries; None is the whole."""
+        return cls.axes.get(name, (name, None))
+
+    @classmethod
+    def _is_number(cls, name: str) -> bool:
+        """Return whether a name means a number or several, and no truth value."""
+        field = cls.model_fields.get(name)
+        if name in cls.axes or field is None:
+            return name in cls.axes
+        usual = field.default if isinstance(field.default, tuple) else ()
+        numbers = [one for one in usual if isinstance(one, int | float) and not isinstance(one, bool)]
+        return field.annotation in (int, float) or 0 < len(usual) == len(numbers)
 
     @property
     def keeps_shape(self) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from .. import __version__, quantities
 from ..arrays import Floats
 from ..lattice import azimuths, colatitudes, window
+from ..rounding import from_zero
 from .clock import Clock
 from .context import Context
 from .errors import InvalidInput, Unstable
@@ -34,6 +35,8 @@ T = TypeVar("T")
 #: Distance [r1] within which two fresh surfaces are of one fruit: its skin may be thicker or thinner.
 _ALIKE = 0.04
 _QUALITIES: tuple[Quality, ...] = ("preview", "default", "fine")
+#: Fields that are of a mesh, not of the lattice.
+_MESHED = frozenset(("mesh_position", "triangle"))
 
 
 class StageAxis(NamedTuple):
@@ -130,8 +133,7 @@ class Solver:
                     advice=f"{hint}Known: {', '.join(sorted(self.presets))}.",
                 )
             base = self.presets[preset]
-        # a whole field given by hand replaces the preset's; a scalar axis replaces one entry of it
-        return self.params.parse({**base, **named(values)})
+        return self.params.parse(self.params.over(base, named(values)))
 
     def stages_after(
         self, hours: Iterable[float], under: Mapping[str, Any], preset: str | None = None
@@ -225,7 +227,7 @@ class Solver:
 
         Raises:
             InvalidInput: unknown field, stage off the axis, a region off the surface or between the points of the
-                lattice, a tolerance finer than what was measured.
+                lattice, fields that none can be cut from, a tolerance beside a quality or finer than what was measured.
 
         """
         unknown = [f for f in need.fields if f not in self.fields]
@@ -240,17 +242,20 @@ class Solver:
         for stage in stages:
             if not axis.lowest <= stage <= axis.highest:
                 raise InvalidInput(
-                    f"stage {stage:g} lies outside {axis.symbol} = {axis.lowest:g} to {axis.highest:g}.",
+                    f"stage {stage:.15g} lies outside {axis.symbol} = {axis.lowest:g} to {axis.highest:g}.",
                     advice=f"Ask for stages ({axis.long_name}) in that range.",
                 )
         if need.start is not None:
             self._check_start(need, stages)
         quality: Quality = need.quality
         if need.tolerance is not None:
+            if "quality" in need.model_fields_set:
+                raise InvalidInput("a tolerance picks the quality, and one is named.", advice="Leave one of them out.")
             quality = self._quality_for(need.tolerance, max(stages), tuple(of))
         resolution = need.resolution or self.default_resolution[quality]
         if need.region is not None:
             _check_region(need.region, resolution)
+            self._check_cut(need.fields)
         return need.model_copy(
             update={
                 "fields": tuple(sorted(need.fields or self.default_fields)),
@@ -270,6 +275,15 @@ class Solver:
         if need.tolerance is not None:
             raise InvalidInput("relaxing promises no tolerance.", advice="Leave it out, or run it without a start.")
 
+    def _check_cut(self, fields: Iterable[str]) -> None:
+        """Refuse fields that a region cuts nothing from, where others are that it does; who has none says so itself."""
+        whole = [name for name in fields if name in _MESHED]
+        if whole and "position" in self.fields:
+            raise InvalidInput(
+                f"{whole[0]} is of the whole mesh, of which a region cuts no part.",
+                advice="Ask for 'position', which is on the lattice, or leave the region out.",
+            )
+
     def _quality_for(self, tolerance: float, last: float, of: tuple[Params, ...]) -> Quality:
         """Return the cheapest quality whose error is at most `tolerance`, for all parameters."""
         best = math.inf
@@ -283,7 +297,7 @@ class Solver:
             best = min(best, reached)
         raise InvalidInput(
             f"a relative error of {tolerance:g} is finer than what {self.name} was measured to reach.",
-            advice=f"The finest setting was measured at {best:.2g}.",
+            advice=f"The finest setting was measured at {from_zero(best)}." if best < 1 else "Name a quality instead.",
         )
 
     def solve(self, params: Params, need: Need | None = None, context: Context | None = None) -> xr.Dataset:

@@ -29,7 +29,7 @@ def rebuild(
     ] = None,
     precision: Annotated[
         Literal["int16", "float32", "float64"] | None,
-        typer.Option("--precision", help="float32, float64, or int16: packed, a quarter to a twelfth of the bytes."),
+        typer.Option("--precision", help="float32, float64, or int16: packed, half to a tenth of float32's bytes."),
     ] = None,
     as_json: As_json = False,
 ) -> None:
@@ -75,6 +75,8 @@ def rebuild(
     before, after = side(old, *(was or (None, None))), side(new, size, lost)
     document = {"table": name, "changed": old.digest != new.digest, "source": "table" if alone else "runs"}
     document |= {"before": before, "after": after}
+    if resolution is not None and resolution > new.resolution:
+        document["note"] = f"the runs hold {new.resolution} waves: the {resolution} asked for cannot be had of them"
     symbol = registry.get(old.solver).stages.symbol
     emit(document, as_json, lambda console: _show_rebuilt(console, document, symbol))
 
@@ -85,6 +87,8 @@ def _show_rebuilt(console: Any, document: dict[str, Any], symbol: str) -> None:
     alone = document["source"] == "table"
     if alone:
         console.print("from its own spectra, as none of its runs is here; lost is what these lose")
+    if "note" in document:
+        console.print(document["note"], markup=False)
     rows = [
         ["digest", before["digest"][:16], after["digest"][:16]],
         *([word, str(before[word]), str(after[word])] for word in ("resolution", "precision", "samples")),

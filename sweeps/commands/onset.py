@@ -47,8 +47,9 @@ def onset(
 ) -> None:
     """Say at which shrinkage a dehydrating fruit starts to buckle, and into what.
 
-    Spheres take milliseconds, fruits with a circular equator seconds, others up to minutes. With --method both, the
-    JSON document is the exact answer and holds the linear one under "linear".
+    Spheres take milliseconds, fruits with a circular equator seconds, others up to minutes. It is the whole fruit's
+    onset: mirrors, which leave a run fewer modes, are left aside. With --method both, the JSON document is the exact
+    answer and holds the linear one under "linear".
 
     [bold]Examples[/bold]
 
@@ -60,8 +61,7 @@ def onset(
     """
     if method not in _METHODS:
         raise InvalidOption(f"--method {method}: unknown.", f"Known: {', '.join(_METHODS)}.")
-    if mode_out is not None:
-        _check(mode_out)
+    _check(mode_out)
     from solver.contract import Context
 
     from .terminal import progress
@@ -91,7 +91,9 @@ def onset(
     emit(document, as_json, lambda console: _show(console, list(found.values()), document))
 
 
-def _check(path: Path) -> None:
+def _check(path: Path | None) -> None:
+    if path is None:
+        return
     if path.suffix.lower() not in (".npz", ".png"):
         raise InvalidOption(f"--mode-out {path}: cannot write {path.suffix or 'no suffix'!r}.", "Known: .npz, .png.")
     check_place("--mode-out", path)

@@ -49,7 +49,7 @@ def results(
 
     [bold]Examples[/bold]
 
-    wizen results --store demo --where 'te<0.03' --sort=-roughness
+    wizen results --store demo --where 'te<0.035' --sort=-roughness
 
     wizen results --store demo --solver growth --last --csv > growth.csv
 

@@ -171,7 +171,7 @@ def query(asked: _Asked) -> None:
         "table": name,
         "digest": table.digest,
         "method": shapes[0].method,
-        "parameters": {**table.fixed, **shapes[0].parameters},
+        "parameters": _parameters(table, shapes[0].parameters),
         "path": None if asked.out is None else str(asked.out),
         "stages": [{**_document(shape), **note} for shape, note in zip(shapes, notes, strict=True)],
     }
@@ -190,6 +190,14 @@ def query(asked: _Asked) -> None:
         metres = known.metres(table.at_parameters(shapes[0].parameters))
         outputs.save(asked.out, replace(made, shade=shade, reach=table.reach, metres=metres))
     emit(document, asked.as_json, lambda console: _show(console, name, shapes, known.stages.symbol, asked.out))
+
+
+def _parameters(table: ShapeTable, values: Mapping[str, float]) -> dict[str, Any]:
+    """Return what a shape is of by names that --set takes: an entry that has none of its own is in its whole field."""
+    known = {**table.fixed, **values}
+    named = {name: value for name, value in known.items() if name.isidentifier()}
+    whole = table.at_parameters(values)
+    return named | {field: whole[field] for field in sorted({n.partition("[")[0] for n in known.keys() - named.keys()})}
 
 
 def _found(asked: _Asked) -> tuple[ShapeTable, list[Shape], list[Mapping[str, Any]]]:
@@ -211,6 +219,8 @@ def _found(asked: _Asked) -> tuple[ShapeTable, list[Shape], list[Mapping[str, An
     where = part(asked.region)
     if where is not None and asked.relax:
         raise InvalidOption("--relax is of whole shapes, and --region leaves a part.", "Keep one of them.")
+    if asked.relax and asked.max_error is not None:
+        raise InvalidOption("--max-error: nobody knows the error of what is relaxed.", "Leave it out.")
     if out is not None:
         outputs.check_suffix(out, False, len(wanted))
     fields = outputs.fields_for(out, False)

@@ -175,8 +175,12 @@ def _parsed(asked: _Asked) -> tuple[Solver, Parameters, Need]:
     from solver.contract import Need
 
     chosen = registry.get(asked.solver)
-    own = {} if asked.seed is None else {"seed": asked.seed}
-    params = chosen.parse(parameters(asked.params_file) | assignments(asked.set_) | own, asked.preset)
+    given = assignments(asked.set_)
+    if asked.seed is not None:
+        if "seed" in given:
+            raise InvalidOption("--seed and --set seed say the same.", "Keep one of them.")
+        given["seed"] = asked.seed
+    params = chosen.parse(chosen.params.over(parameters(asked.params_file), given), asked.preset)
     said: dict[str, Any] = {name: getattr(asked, name) for name in ("quality", "tolerance", "resolution", "dtype")}
     where = part(asked.region)
     said["region"] = None if where is None else where.need

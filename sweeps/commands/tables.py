@@ -42,7 +42,7 @@ def build(
         str | None, typer.Option("--plan", help="Only the results of this plan: its name, or its file.")
     ] = None,
     quality: Quality = None,
-    resolution: Annotated[int | None, typer.Option("--resolution", help="Cut the spectra to this band.")] = None,
+    resolution: Annotated[int | None, typer.Option("--resolution", min=4, help="Cut the spectra to this band.")] = None,
     precision: Annotated[
         Literal["int16", "float32", "float64"], typer.Option("--precision", help="As for `table rebuild`.")
     ] = "float32",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import statistics
 
+import numpy as np
 import pytest
 
 from benchmarks import figures
@@ -65,6 +66,17 @@ def test_a_tolerance_takes_the_quality_that_the_fruit_needs() -> None:
     assert SOLVER.settle(Need(tolerance=0.35), of=both).quality == "fine"
     with pytest.raises(InvalidInput, match="finer than what"):
         SOLVER.settle(Need(tolerance=0.05), of=both)
+
+
+@pytest.mark.parametrize("last", [0.1, 0.3])
+def test_the_tolerance_that_a_refusal_says_is_one_that_is_reached(last: float) -> None:
+    for te in np.linspace(0.02, 0.04, 6):
+        for gamma in (10.0, 13.0, 22.0, 35.0, 50.0):
+            params = SOLVER.parse({"te": float(te), "gamma": gamma})
+            with pytest.raises(InvalidInput) as caught:
+                SOLVER.settle(Need(tolerance=1e-3, stages=(last,)), of=[params])
+            said = float(caught.value.advice.removeprefix("The finest setting was measured at ").removesuffix("."))
+            SOLVER.settle(Need(tolerance=said, stages=(last,)), of=[params])
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import statistics
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from benchmarks import figures
 from solver.contract import InvalidInput, Need, OverBudget, budget
 from solver.dehydration import SOLVER
+from solver.rounding import from_zero
 
 FRUIT = SOLVER.parse({})
 NEED = SOLVER.settle(Need(stages=(0.3,), quality="default"))
@@ -23,13 +25,30 @@ def test_what_fits_is_let_through() -> None:
 
 
 def test_what_takes_longer_is_refused_with_what_it_would_take() -> None:
-    with pytest.raises(OverBudget, match=f"about {COST.seconds:.0f} s") as caught:
+    with pytest.raises(OverBudget, match=f"about {from_zero(COST.seconds)} s") as caught:
         budget.within(SOLVER, (FRUIT,), NEED, COST.seconds * 0.99)
     cheap = SOLVER.cost(FRUIT, NEED.model_copy(update={"quality": "preview"})).seconds
-    assert f"'preview' would take about {cheap:.0f} s" in caught.value.advice
+    assert f"'preview' would take about {from_zero(cheap)} s" in caught.value.advice
     assert isinstance(caught.value, InvalidInput)
     with pytest.raises(OverBudget, match="these 2 runs"):
         budget.within(SOLVER, (FRUIT, FRUIT), NEED, 1.5 * COST.seconds)
+
+
+@pytest.mark.parametrize("stage", [0.01, 0.05, 0.1, 0.2, 0.3])
+@pytest.mark.parametrize("te", [0.02, 0.03, 0.04, 0.1])
+@pytest.mark.parametrize("count", [1, 3])
+def test_the_time_that_a_refusal_says_is_one_that_is_enough(stage: float, te: float, count: int) -> None:
+    """Of the quality that was asked for, and of the cheaper one that is offered in its place."""
+    fruits = (SOLVER.parse({"te": te}),) * count
+    need = SOLVER.settle(Need(stages=(stage,), quality="fine"))
+    with pytest.raises(OverBudget) as caught:
+        budget.within(SOLVER, fruits, need, 1e-3)
+    own = re.search(r"about (\S+) s, longer than the 0.001 s", caught.value.message)
+    other = re.search(r"Quality '(\w+)' would take about (\S+) s", caught.value.advice)
+    assert own is not None
+    assert other is not None
+    budget.within(SOLVER, fruits, need, float(own[1]))
+    budget.within(SOLVER, fruits, need.model_copy(update={"quality": other[1]}), float(other[2]))
 
 
 def test_what_needs_more_memory_is_refused() -> None:

@@ -262,6 +262,54 @@ def test_a_tolerance_picks_the_cheapest_quality_that_was_measured_to_reach_it(so
         solver.settle(Need(tolerance=1e-9))
 
 
+def test_a_tolerance_beside_a_quality_is_refused(solver):
+    both = Need.parse({"tolerance": max(solver.tolerances.values()), "quality": "preview"})
+    with pytest.raises(InvalidInput, match="picks the quality"):
+        solver.settle(both)
+    # what is settled names the quality that was picked, and may be settled again
+    settled = solver.settle(Need.parse({"tolerance": max(solver.tolerances.values())}))
+    assert solver.settle(settled) == settled
+
+
+def test_a_field_of_the_whole_mesh_is_refused_beside_a_region():
+    solver = registry.get("dehydration")
+    with pytest.raises(InvalidInput, match="mesh_position is of the whole mesh"):
+        solver.settle(Need(fields=("mesh_position", "volume"), region=Region(colatitude=(0, 90))))
+    solver.settle(Need(fields=("position",), region=Region(colatitude=(0, 90))))
+
+
+def test_a_value_by_two_names_is_refused():
+    solver = registry.get("dehydration")
+    for preset in (None, "plum1"):
+        with pytest.raises(InvalidInput) as caught:
+            solver.parse({"te": 0.03, "exocarp_thickness": 0.05}, preset)
+        assert str(caught.value) == "a value is given twice, as te and exocarp_thickness. Leave one of them out."
+
+
+def test_what_is_said_goes_over_a_preset_by_whatever_name():
+    solver = registry.get("dehydration")
+    short, long = ({**solver.presets["plum1"], "te": 0.05}, {"te": 0.05, "r2": 0.9, "gamma": 30.0})
+    assert solver.parse({"te": 0.05}, "plum1").axis("te") == 0.05
+    assert solver.params.over(short, {"exocarp_thickness": 0.03}) == {
+        **solver.presets["plum1"],
+        "exocarp_thickness": 0.03,
+    }
+    assert solver.params.over(long, {"radii": [1.0] * 8}) == {"te": 0.05, "gamma": 30.0, "radii": [1.0] * 8}
+    # an entry leaves the rest of its field
+    assert solver.params.over({"radii": [1.0] * 8}, {"r2": 0.9}) == {"radii": [1.0] * 8, "r2": 0.9}
+    assert solver.parse({"stone": [0.3, 0.3], "rs1": 0.35}).stone == (0.35, 0.3)
+
+
+@pytest.mark.parametrize("values", [{"gamma": True}, {"seed": True}, {"rs1": False}, {"stone": [True, 0.4]}])
+def test_a_truth_value_is_no_number(values):
+    with pytest.raises(InvalidInput, match=f"{next(iter(values))}: a truth value is no number"):
+        registry.get("dehydration").parse(values)
+
+
+def test_a_truth_value_is_one_where_one_is_wanted():
+    assert registry.get("growth").parse({"curved": True}).curved
+
+
 def test_cost_grows_with_quality(solver):
     params, need, dear = small(solver)
     cheap = solver.cost(params, solver.settle(need))

@@ -104,6 +104,7 @@ def test_presets_dry_as_their_fruit() -> None:
         ("raisin", 10, {"temperature": 60}, "open sun"),
         ("raisin", 200, {}, "outside of what was measured"),
         ("raisin", -1, {}, "outside of what was measured"),
+        ("raisin", 176.0001, {}, r"hours = 176\.0001 h is outside of what was measured: 0 to 176 h"),
         ("raisin", 10, {"diameter": 30}, "outside of what was measured"),
         ("jujube1", 10, {}, "want temperature, air_speed, diameter"),
         ("jujube1", 10, {"temperature": 80, "air_speed": 1, "diameter": 22}, "outside of what was measured"),

@@ -391,6 +391,13 @@ def test_the_solver_answers_it_as_well() -> None:
     assert found.s_cr == pytest.approx(0.08054538543842547, rel=1e-6)
 
 
+def test_mirrors_are_said_to_be_left_aside() -> None:
+    whole, part = (onset(DehydrationParams.parse({"te": 0.1, **more})) for more in ({}, {"mirrors": "xyz"}))
+    assert part.s_cr == whole.s_cr
+    assert "mirrors" not in whole.reason
+    assert "the whole fruit's onset: with mirrors = xyz" in part.reason
+
+
 def test_no_product_of_matrices_is_left_to_two_threads(monkeypatch: pytest.MonkeyPatch) -> None:
     threads: list[int] = []
 

@@ -167,6 +167,18 @@ def test_solve_says_all_of_a_need(shrinking: Solves, tmp_path: Path) -> None:
     assert need["region"] == {"colatitude": [0.0, 90.0], "azimuth": [0.0, 180.0]}
 
 
+def test_parameters_of_a_file_give_way_to_what_is_set_by_whatever_name(shrinking: Solves, tmp_path: Path) -> None:
+    file = tmp_path / "fruit.toml"
+    file.write_text("te = 0.03\ngamma = 20\nseed = 7\n")
+    asked = ("solve", "shrinking", "--stages", "0.1", "--json", "--params", file)
+    found = document(wizen(*asked, "--set", "exocarp_thickness=0.05", "--seed", 8))["params"]
+    assert (found["exocarp_thickness"], found["modulus_ratio"], found["seed"]) == (0.05, 20.0, 8)
+    file.write_text("te = 0.03\nexocarp_thickness = 0.02\n")
+    refused = wizen(*asked)
+    assert refused.exit_code == 2
+    assert "given twice" in document(refused)["error"]["message"]
+
+
 EIGHTH = ("solve", "dehydration", "--set", "te=0.1", "--set", "mirrors=xyz", "--quality", "preview", "--resolution", 8)
 
 
@@ -248,6 +260,11 @@ def test_a_solve_that_fails_has_exit_code_1(shrinking: Solves) -> None:
         ("solve dehydration --set gama=3", 2, "did you mean 'gamma'"),
         ("solve dehydration --set te", 2, "NAME=VALUE"),
         ("solve dehydration --set te=thick", 2, "exocarp_thickness"),
+        ("solve dehydration --set gamma=true", 2, "gamma: a truth value is no number"),
+        ("solve dehydration --set te=0.03 --set exocarp_thickness=0.05", 2, "as te and exocarp_thickness"),
+        ("solve dehydration --seed 5 --set seed=6", 2, "--seed"),
+        ("solve dehydration --quality preview --tolerance 0.3", 2, "a tolerance picks the quality"),
+        ("solve dehydration --fields mesh_position --region 0:10,0:90", 2, "mesh_position is of the whole mesh"),
         ("solve dehydration --set te=0.02 --set te=0.03", 2, "twice"),
         ("solve dehydration --set rs1=1.1", 2, "stone"),
         ("solve dehydration --stages 0.1,x", 2, "not a number"),
@@ -274,10 +291,14 @@ def test_a_solve_that_fails_has_exit_code_1(shrinking: Solves) -> None:
         ("table build --store {tmp}/nowhere", 1, "there is no store"),
         ("table info --store {table} --name other", 1, "other"),
         ("table build --store {table} --solver decay", 1, "decay"),
+        ("table build --store {table} --resolution 0", 2, "--resolution"),
         ("query --store {table} --name other", 1, "other"),
         ("query --store {table} --set te=0.03 --set gamma=10", 2, "--stages"),
         ("query --store {table} --set te=0.03 --set gamma=10 --stages 0.1 --region 0,90", 2, "like 45:90,0:120"),
         ("query --store {table} --set te=0.03 --set gamma=10 --stages 0.1 --region 0,90,0,90 --relax", 2, "--relax"),
+        ("query --store {table} --set te=0.03 --set gamma=10 --stages 0.1 --max-error 1 --relax", 2, "is relaxed"),
+        ("query --store {table} --set te=0.03 --set gamma=true --stages 0.1", 2, "gamma: a truth value is no number"),
+        ("query --store {table} --set te=0.03 --set exocarp_thickness=0.02 --stages 0.1", 2, "given twice"),
         ("query --store {table} --set te=0.03 --set gamma=99 --stages 0.1", 2, "lies outside"),
         ("query --store {table} --set te=0.03 --stages 0.1", 2, "gamma must be given"),
         ("map --store {table} --out map.jpg", 2, ".png"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shlex
 import shutil
 from itertools import pairwise
@@ -82,6 +83,16 @@ def test_rebuild_and_compare(table: Path, tmp_path: Path) -> None:
     assert wizen("table", "compare", "nothing.h5", copy).exit_code == 2
 
 
+def test_more_waves_than_the_runs_hold_are_said_not_to_be_had(table: Path, tmp_path: Path) -> None:
+    rebuild = ("table", "rebuild", "--store", shutil.copytree(table, tmp_path / "copy"), "--resolution")
+    said = document(wizen(*rebuild, 1000, "--json"))
+    held = said["after"]["resolution"]
+    assert held < 1000
+    assert said["note"] == f"the runs hold {held} waves: the 1000 asked for cannot be had of them"
+    assert said["note"] in " ".join(wizen(*rebuild, 1000).stdout.split())
+    assert "note" not in document(wizen(*rebuild, held, "--json"))
+
+
 def test_a_table_whose_runs_are_not_here(table: Path, tmp_path: Path) -> None:
     copy = shutil.copytree(table, tmp_path / "copy")
     for path in (copy / "shards").glob("??/*.h5"):
@@ -140,6 +151,19 @@ def test_how_a_table_s_runs_were_done_may_be_said_as_it_is(said: tuple[str, ...]
     other = wizen("query", "--name", found["table"], *said[:-1], f"{name}=other", "--stages", "0.2")
     assert other.exit_code == 2
     assert f"{name} is {value} in the whole table" in " ".join(other.stderr.split())
+
+
+def test_the_parameters_of_an_answer_ask_for_it_again() -> None:
+    """Entries of a field without a name of their own are told in their field."""
+    asked = ("query", "--stages", "0.2", "--resolution", 16, "--json")
+    found = document(wizen(*asked, "--preset", "plum1"))
+    assert found["parameters"]["radii"][0] == 1.0
+    said = [
+        f"--set={name}={json.dumps(value)}" for name, value in found["parameters"].items() if value not in ("", None)
+    ]
+    again = document(wizen(*asked, "--name", found["table"], *said))
+    assert again["parameters"] == found["parameters"]
+    assert again["stages"] == found["stages"]
 
 
 def test_a_coarse_lattice_is_said_to_leave_wrinkles_out() -> None:

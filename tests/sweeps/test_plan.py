@@ -52,6 +52,20 @@ def test_generated_values_are_the_ones_that_people_write() -> None:
     assert [sample.model_dump()["exocarp_thickness"] for sample in ranged.samples] == written
 
 
+@pytest.mark.parametrize(
+    ("tables", "said"),
+    [
+        ({"need": {"tolerance": 0.5, "quality": "preview"}}, "[need]: a tolerance picks the quality"),
+        ({"set": {"te": 0.03, "exocarp_thickness": 0.05}}, "twice, as te and exocarp_thickness"),
+        ({"set": {"te": True}}, "te: a truth value is no number"),
+    ],
+)
+def test_what_contradicts_itself_is_refused(tables: dict[str, Any], said: str) -> None:
+    with pytest.raises(PlanError) as caught:
+        plan(axes={"gamma": [10, 20]}, **tables)
+    assert said in str(caught.value)
+
+
 PATTERN = {"sample": {"te": 0.03}, "stage": 0.1, "controls": [{"te": 0.02}]}
 
 
@@ -252,3 +266,13 @@ def test_files_that_are_no_plans(tmp_path: Path) -> None:
         (tmp_path / "bad.toml").write_bytes(content)
         with pytest.raises(PlanError, match="is not TOML"):
             Plan.load(tmp_path / "bad.toml")
+
+
+@pytest.mark.parametrize("name", ["queue", "queue:refined"])
+def test_no_plan_joins_the_service_s_queue(tmp_path: Path, name: str) -> None:
+    path = tmp_path / f"{name}.toml"
+    path.write_text('solver = "dehydration"\n')
+    for read in (lambda: Plan.load(path), lambda: plan(name=name), lambda: replace(plan(), name=name)):
+        with pytest.raises(PlanError, match="Say another `name`"):
+            read()
+    assert plan(name="queues").name == "queues"

@@ -8,6 +8,7 @@ shape before the onset.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
@@ -35,7 +36,9 @@ def onset(
     tests, 4 to 9 % for the axisymmetric fruits of Table 1, and at about 1.5 times the degree. kappa_ratio: bulk over
     shear modulus of both layers, None for incompressible. road: None takes the cheapest one that the shape allows.
 
-    A fruit that stays smooth up to s = 0.6 is an answer, not a failure: `s_cr` is None and `reason` says so.
+    A fruit that stays smooth up to s = 0.6 is an answer, not a failure: `s_cr` is None and `reason` says so. It is the
+    whole fruit's onset, whatever `params.mirrors` say, and `reason` says that too: runs between these planes may start
+    later, as they have no modes that are odd about them.
 
     Raises:
         InvalidInput: unknown method, quality or road, a road that the shape does not allow, kappa_ratio off its range,
@@ -62,7 +65,11 @@ def onset(
     # two threads take longer for fronts of some hundreds, and round otherwise; only libraries that are loaded are held
     find = _road(road or best)
     with threadpool_limits(1, user_api="blas"):
-        return find(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context)
+        found = find(params, method=method, kappa_ratio=kappa_ratio, quality=quality, context=context)
+    if not params.mirrors or found.s_cr is None:
+        return found
+    mirrored = f"this is the whole fruit's onset: with mirrors = {params.mirrors} a run has fewer modes, maybe later"
+    return replace(found, reason="; ".join(filter(None, (found.reason, mirrored))))
 
 
 def _road(road: Road) -> Callable[..., Onset]:

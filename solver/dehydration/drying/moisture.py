@@ -123,7 +123,7 @@ def _ratio(wet: float) -> float:
 def _bearable(hours: float) -> None:
     if not 0 <= hours <= _LONGEST:
         raise InvalidInput(
-            f"hours = {hours:g} h is no time that a fruit dries for: 0 to {_LONGEST:.0f} h.",
+            f"hours = {hours:.15g} h is no time that a fruit dries for: 0 to {_LONGEST:.0f} h.",
             advice="Take hours from there.",
         )
 
@@ -131,6 +131,7 @@ def _bearable(hours: float) -> None:
 def _within(name: str, value: float, low: float, high: float, units: str) -> None:
     if not low <= value <= high:
         raise InvalidInput(
-            f"{name} = {value:g} {units} is outside of what was measured: {low:g} to {towards_zero(high, 4)} {units}.",
+            f"{name} = {value:.15g} {units} is outside of what was measured: "
+            f"{low:g} to {towards_zero(high, 4)} {units}.",
             advice=f"Take {name} from there, or set kinetics=page with rate and exponent of your own measurements.",
         )

@@ -43,7 +43,8 @@ def asked_table(
 
     Raises:
         InvalidOption: tables of several solvers are there, and none is chosen.
-        InvalidInput: there is no such preset, no fruit can be like that, or no run has that stage.
+        InvalidInput: there is no such preset, no fruit can be like that, what is said is no value or said twice, or no
+            run has that stage.
         OutsideTable: no table holds what is asked; which is the nearest, and what differs.
         StaleTable: the table is of another version of the solver.
         UnknownTable, CorruptTable, MissingStore: there is no such table, it is damaged, or there is no store.
@@ -57,6 +58,7 @@ def asked_table(
 
     opened = open_store(root)
     chosen = solver_of(opened, name, solver)
+    chosen.params.check_given(said)
     if preset is not None and preset not in chosen.presets:
         chosen.parse({}, preset)  # says which there are
     families, filled = stored.families(opened, chosen), {}
