@@ -24,6 +24,7 @@ from ..params import DehydrationParams
 from .field import dominant, mode_heights, round_it
 from .looks import SAME, Look, Pair, elsewhere, even
 from .places import expected_onsets
+from .radial import stable_reason
 from .result import FieldMode, Method, Onset, Tie
 from .rings import Rings
 from .states import States
@@ -103,7 +104,7 @@ def onset_full(
     if not found:
         return Onset(
             None, None, None, "full", method, kappa_ratio, None, seconds=time.perf_counter() - begin, settings=settings,
-            searched=SEARCHED, reason=f"the smooth shape stays stable up to s = {SEARCHED:g}",
+            searched=SEARCHED, reason=stable_reason(SEARCHED),
         )  # fmt: skip
     modes = []
     for number, each in enumerate(found):
