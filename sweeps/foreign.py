@@ -10,6 +10,7 @@ import io
 import json
 import re
 import struct
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -28,9 +29,16 @@ _LINE, _HEADER, _JSON = 1 << 16, 1 << 16, 32 << 20
 _PACKED = {b"\x1f\x8b": "gzip", b"PK\x03\x04": "zip", b"BZh": "bzip2", b"\xfd7zXZ": "xz", b"(\xb5/\xfd": "zstd"}
 _TYPES = {"char": 1, "uchar": 1, "int8": 1, "uint8": 1, "short": 2, "ushort": 2, "int16": 2, "uint16": 2, "int": 4}
 _TYPES |= {"uint": 4, "int32": 4, "uint32": 4, "float": 4, "float32": 4, "double": 8, "float64": 8}
+#: A line that adds a point or a face. Blanks go no further than their line: a file of line ends is read in one pass.
+_COUNTED = re.compile(rb"^[ \t]*[vf][ \t]", re.MULTILINE)
 #: glTF 2.0: bytes of a component, components of an element.
 _COMPONENTS = {5120: 1, 5121: 1, 5122: 2, 5123: 2, 5125: 4, 5126: 4}
 _ELEMENTS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "MAT4": 16}
+#: Accessors may share bytes: how often all of them on average, besides those of small files. Attributes that points
+#: have as a rule, at most: more of them count as more points.
+_SHARED, _FREE, _ATTRIBUTES = 8, 1 << 20, 8
+#: Readers go all the way up from every node: so many steps at most.
+_STEPS = 200_000
 
 
 class ForeignMesh(SweepError):
@@ -74,7 +82,7 @@ def checked(path: Path) -> bytes:
         {".obj": _obj, ".ply": _ply, ".glb": _glb, ".stl": _stl}[path.suffix.lower()](data)
     except _Wrong as error:
         raise ForeignMesh(path, str(error)) from None
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, struct.error) as error:
+    except (ArithmeticError, LookupError, ValueError, TypeError, AttributeError, RecursionError, struct.error) as error:
         raise ForeignMesh(path, f"{type(error).__name__}: {error}"[:200]) from None
     return data
 
@@ -92,10 +100,11 @@ def read(path: Path) -> Any:
         import trimesh
     except ImportError:
         raise NoReader("meshes need the package trimesh.", installing("formats")) from None
+    kind = path.suffix.lower()[1:]
+    # pictures within the file are as large as they say: nobody here looks at them
+    options = {"skip_materials": True} if kind == "glb" else {}
     try:
-        return trimesh.load(
-            io.BytesIO(data), file_type=path.suffix.lower()[1:], resolver=None, force="mesh", process=False
-        )
+        return trimesh.load(io.BytesIO(data), file_type=kind, resolver=None, force="mesh", process=False, **options)
     except Exception as error:  # readers of foreign files stumble in as many ways as there are files
         raise ForeignMesh(path, f"{type(error).__name__}: {error}"[:200]) from None
 
@@ -134,7 +143,7 @@ def _obj(data: bytes) -> None:
         raise _Wrong("it is no text")
     if max(map(len, data.splitlines()), default=0) > _LINE:
         raise _Wrong(f"a line is longer than {_LINE} bytes")
-    _at_most(len(re.findall(rb"^\s*[vf]\s", data, re.M)), "vertices and faces")
+    _at_most(sum(1 for _ in _COUNTED.finditer(data)), "vertices and faces")
 
 
 def _stl(data: bytes) -> None:
@@ -187,7 +196,7 @@ def _glb(data: bytes) -> None:
     if packed:
         raise _Wrong(f"it needs {packed.pop()}")
     _glb_sizes(page, binary)
-    _glb_tree(page)
+    _glb_drawn(page, _glb_tree(page))
 
 
 def _glb_sizes(page: Any, binary: int) -> None:
@@ -197,16 +206,43 @@ def _glb_sizes(page: Any, binary: int) -> None:
         begin, size = int(view.get("byteOffset", 0)), int(view["byteLength"])
         if begin < 0 or size < 0 or view.get("buffer") != 0 or begin + size > binary:
             raise _Wrong("a buffer view lies outside of it")
+    total = 0
     for accessor in page.get("accessors", []):
         count = _at_most(int(accessor["count"]), "elements")
         if "sparse" in accessor or "bufferView" not in accessor:
             raise _Wrong("an accessor has no bytes of its own")
         element = _COMPONENTS[accessor["componentType"]] * _ELEMENTS[accessor["type"]]
         view = views[_index(accessor["bufferView"], views)]
-        stride = max(int(view.get("byteStride", element)), 1)
+        stride = int(view.get("byteStride", element))
+        if stride < element:
+            raise _Wrong("elements of an accessor lie in each other")
         begin = int(accessor.get("byteOffset", 0))
         if begin < 0 or begin + (count - 1) * stride + element > int(view["byteLength"]):
             raise _Wrong("an accessor is larger than its view")
+        total += count * element
+    if total > _SHARED * binary + _FREE:
+        raise _Wrong(f"its accessors hold {total} bytes, and it has {binary}")
+
+
+def _glb_drawn(page: Any, nodes: Sequence[int]) -> None:
+    """Refuse numbers that are few in the file and many once it is read: primitives and nodes may name them any number
+    of times. `nodes` come after those that they hang below.
+    """
+    accessors, tree = page.get("accessors", []), page.get("nodes", [])
+    held = [sum(_glb_size(part, accessors) for part in mesh["primitives"]) for mesh in page.get("meshes", [])]
+    own = [1 + (held[_index(node["mesh"], held)] if "mesh" in node else 0) for node in tree]
+    below = list(own)
+    for i in reversed(nodes):
+        below[i] += sum(below[child] for child in tree[i].get("children", ()))
+    scenes = [sum(below[_index(i, tree)] for i in scene.get("nodes", ())) for scene in page.get("scenes", [])]
+    _at_most(max([sum(held), sum(own), *scenes]), "points or triangles")
+
+
+def _glb_size(part: Any, accessors: Any) -> int:
+    """Return how many points, triangles or eights of numbers of points a primitive has, whichever are most."""
+    counts = [int(accessors[_index(one, accessors)]["count"]) for one in part["attributes"].values()]
+    corners = int(accessors[_index(part["indices"], accessors)]["count"]) if "indices" in part else 0
+    return 1 + max([*counts, sum(counts) // _ATTRIBUTES, corners // 3])
 
 
 def _index(value: Any, among: Any) -> int:
@@ -216,16 +252,24 @@ def _index(value: Any, among: Any) -> int:
     return value
 
 
-def _glb_tree(page: Any) -> None:
-    """Refuse nodes that are not a tree: rings, and meshes hung up a billion times."""
+def _glb_tree(page: Any) -> list[int]:
+    """Return all nodes, each after the one that it hangs below; refuse those that are not trees: rings, and meshes hung
+    up a billion times.
+    """
     nodes = page.get("nodes", [])
     children = [_index(child, nodes) for node in nodes for child in node.get("children", ())]
     if len(children) != len(set(children)):
         raise _Wrong("a node has two parents")
-    roots = [i for i in range(len(nodes)) if i not in set(children)]
-    reached, level = 0, roots
+    level = sorted(set(range(len(nodes))) - set(children))
+    reached: list[int] = []
+    depth = steps = 0
     while level:
-        reached += len(level)
+        reached += level
+        depth += 1
+        steps += depth * len(level)
+        if steps > _STEPS:
+            raise _Wrong("its nodes are too many, or hang too deep")
         level = [child for i in level for child in nodes[i].get("children", ())]
-    if reached != len(nodes):
+    if len(reached) != len(nodes):
         raise _Wrong("its nodes hang in a ring")
+    return reached

@@ -49,8 +49,8 @@ def obj(text: str) -> Parts:
     names: dict[str, int] = {}
     material: list[int] = []
     current = -1
-    groups: dict[str, set[int]] = {}
-    entered: list[set[int]] = []
+    groups: dict[str, list[slice]] = {}
+    entered, since = list[str](), 0
     for line in text.splitlines():
         words = line.split()
         if words[:1] == ["v"]:
@@ -60,28 +60,29 @@ def obj(text: str) -> Parts:
         elif words[:1] == ["usemtl"]:
             current = names.setdefault(" ".join(words[1:]) or "material", len(names))
         elif words[:1] == ["g"]:
+            _leave(groups, entered, since, len(faces))
             # so Blender calls what is in none, and OBJ itself
-            entered = [groups.setdefault(word, set()) for word in words[1:] if word not in ("off", "default")]
+            entered, since = [word for word in dict.fromkeys(words[1:]) if word not in ("off", "default")], len(faces)
         elif words[:1] == ["f"]:
             ends = [[_number(word, k, (len(points), len(uv))) for k in (0, 1)] for word in words[1:]]
-            for group in entered:
-                group.update(end[0] for end in ends)
             for b, c in pairwise(ends[1:]):
                 faces.append([ends[0][0], b[0], c[0]])
                 corners.append([ends[0][1], b[1], c[1]])
                 material.append(current)
+    _leave(groups, entered, since, len(faces))
     of_corner = np.array(corners, np.int64).reshape(-1, 3)
     textured = bool(uv) and len(of_corner) > 0 and bool((of_corner >= 0).all()) and int(of_corner.max()) < len(uv)
     owned = np.array(material, np.int64)
     plain = bool((owned < 0).any())
+    triangles = np.array(faces, np.int64).reshape(-1, 3)
     return Parts(
         np.array(points, float).reshape(-1, 3),
-        np.array(faces, np.int64).reshape(-1, 3),
+        triangles,
         np.array(uv, float) if textured else None,
         of_corner if textured else None,
         (*names, *(["skin"] if plain and names else [])),
         np.where(owned < 0, len(names), owned),
-        _weights({name: inside for name, inside in groups.items() if inside}, len(points)),
+        _weights(groups, triangles, len(points)),
     )
 
 
@@ -99,12 +100,21 @@ def check_count(groups: int) -> None:
         )
 
 
-def _weights(groups: dict[str, set[int]], points: int) -> dict[str, Floats]:
-    """Return 1 for the points in each group, and 0."""
-    check_count(len(groups))
+def _leave(groups: dict[str, list[slice]], entered: list[str], since: int, now: int) -> None:
+    """Add the triangles since some groups were entered to each of these; groups that nothing is in are none."""
+    if now > since:
+        check_count(len(entered))
+        for name in entered:
+            groups.setdefault(name, []).append(slice(since, now))
+        check_count(len(groups))
+
+
+def _weights(groups: dict[str, list[slice]], faces: Ints, points: int) -> dict[str, Floats]:
+    """Return 1 for the points of the triangles in each group, and 0."""
     found: dict[str, Floats] = {name: np.zeros(points) for name in groups}
-    for name, inside in groups.items():
-        found[name][list(inside)] = 1.0
+    for name, parts in groups.items():
+        for part in parts:
+            found[name][faces[part]] = 1.0
     return found
 
 

@@ -11,6 +11,7 @@ from typing import Any
 from urllib.parse import urlencode
 
 from store.errors import StoreError
+from store.manifest import TableInfo
 
 from .. import vocabulary
 from ..errors import InvalidQuery, Wrong
@@ -83,6 +84,8 @@ def ranges(tables: LiveTables, name: str | None, known: Mapping[str, float]) -> 
             wrong.append(Wrong(one[:40], "is no parameter of these tables", advice))
         elif not math.isfinite(value):
             wrong.append(Wrong(one, "is not finite", "Write it like 0.03."))
+        elif _is_word(one, infos):
+            wrong.append(Wrong(one, "is no number in these tables", "Leave it out."))
     if wrong:
         raise InvalidQuery.of(wrong)
     found, off = [], list[str]()
@@ -107,6 +110,12 @@ def ranges(tables: LiveTables, name: str | None, known: Mapping[str, float]) -> 
     return found
 
 
+def _is_word(name: str, infos: Sequence[TableInfo]) -> bool:
+    """Return whether tables hold a parameter, and none of them a number for it."""
+    held = [info.fixed[name] for info in infos if name in info.fixed]
+    return bool(held) and not any(name in i.axes for i in infos) and not any(isinstance(h, int | float) for h in held)
+
+
 def _held(
     axes: Mapping[str, tuple[float, float]],
     fixed: Mapping[str, Any],
@@ -123,9 +132,14 @@ def _held(
             if not low <= value <= high:
                 return None
             held[name] = value
-        elif name not in fixed or not math.isclose(float(fixed[name]), value, rel_tol=1e-9, abs_tol=1e-12):
+        elif not _same(fixed.get(name), value):
             return None
     return held
+
+
+def _same(held: Any, value: float) -> bool:
+    """Return whether what a table holds is a number; words and patterns are none."""
+    return isinstance(held, int | float) and math.isclose(float(held), value, rel_tol=1e-9, abs_tol=1e-12)
 
 
 def _comparable(target: Target, searched: Sequence[Range]) -> None:

@@ -30,6 +30,8 @@ _SMOOTH = 4e-4
 _LEAST = 0.1
 #: Least and largest side of a mask, and the share of it that a shape fills at least [pixel, pixel, 1].
 _SMALL, _LARGE, _SHARE = 32, 8192, 0.005
+#: Most pixels: those of a mask in one colour are few bytes, and all of them are looked at.
+_PIXELS = 1 << 24
 
 
 def read(data: bytes) -> Bools:
@@ -46,6 +48,8 @@ def read(data: bytes) -> Bools:
             wide, tall = picture.size
             if min(wide, tall) < _SMALL or max(wide, tall) > _LARGE:
                 raise Unreadable(f"it is {wide} x {tall} pixels, and {_SMALL} to {_LARGE} are read")
+            if wide * tall > _PIXELS:
+                raise Unreadable(f"it is {wide} x {tall} pixels, more than {_PIXELS} in all: 1000 across are plenty")
             alpha = "A" in picture.getbands() or "transparency" in picture.info
             planes = np.asarray(picture.convert("RGBA" if alpha else "L"))
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
@@ -90,15 +94,17 @@ def of_mask(mask: Bools, unit: float | None) -> Signature:
     """
     from scipy import ndimage
 
-    y, x = np.nonzero(mask)
-    middle = np.array([y.mean(), x.mean()])
-    radius = float(np.sqrt(len(y) / np.pi))
-    reach = np.hypot(y - middle[0], x - middle[1]).max() + 2
+    sums = [mask.sum(axis=1 - axis) for axis in (0, 1)]
+    middle = np.array([(np.arange(len(one)) * one).sum() / one.sum() for one in sums])
+    radius = float(np.sqrt(sums[0].sum() / np.pi))
+    # no farther than the corners of what holds it
+    ends = [np.flatnonzero(one)[[0, -1]] for one in sums]
+    reach = np.hypot(*(np.abs(end - at).max() for end, at in zip(ends, middle, strict=True))) + 2
     along = np.arange(0, reach, 0.25)
     angles = np.arange(_RAYS) * 2 * np.pi / _RAYS
     rows = middle[0] - np.sin(angles)[:, None] * along
     columns = middle[1] + np.cos(angles)[:, None] * along
-    inside = ndimage.map_coordinates(mask.astype(float), [rows, columns], order=1) >= 0.5
+    inside = ndimage.map_coordinates(mask.view(np.uint8), [rows, columns], float, order=1) >= 0.5
     if not inside.any(axis=1).all():
         raise Unreadable("the middle of the shape lies outside of it")
     last = inside.shape[1] - 1 - inside[:, ::-1].argmax(axis=1)

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import threading
+import asyncio
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Annotated, Any
 
 import anyio.to_thread
+from anyio.lowlevel import RunVar
 from fastapi import APIRouter, Query, Request
 
 from .. import problems
 from ..errors import InvalidQuery, Overloaded, TimedOut, Wrong
 from ..formats import sent
+from ..limits import waited
 from ..settings import Settings
 from ..shapes.live import LiveTables
 from ..views.addresses import link
@@ -35,8 +37,9 @@ _NUMBERS: dict[str, Any] = {
     },
     "examples": {"some": {"value": {"roughness": 0.04, "volume": [0.62, 0.01]}}},
 }
-#: A search uses all that one core gives for seconds: one at a time, and the next waits so long [s].
-_ONE, _WAIT = threading.Lock(), 10.0
+#: A search uses all that one core gives for seconds, and what is read for it may be large: one at a time, whose turn it
+#: is, and the next waits so long [s]. None who waits takes a thread from what is quickly answered.
+_TURN, _WAIT = RunVar[anyio.Lock]("wizen.match"), 10.0
 #: Share of the service's time-out after which a search is given up.
 _PATIENCE = 0.9
 
@@ -77,8 +80,10 @@ async def match(
     body = await request.body()
     media = request.headers.get("content-type", "").partition(";")[0].strip().lower()
     settings: Settings = request.app.state.settings
-    work = partial(_matched, body, media, size, table, _known(known), request.app.state.tables, settings.timeout)
-    page: MatchPage = await anyio.to_thread.run_sync(work)
+    progress = _until(_PATIENCE * settings.timeout)
+    work = partial(_matched, body, media, size, table, _known(known), request.app.state.tables, progress)
+    # whoever leaves does not take the turn with him: it ends when the thread does
+    page = await asyncio.shield(_alone(work, min(_WAIT, 0.5 * settings.timeout)))
     for one in (page.best, *page.alternatives):
         one.link = link(one.link)
     return page
@@ -104,6 +109,39 @@ def _known(text: str) -> dict[str, float]:
     return found
 
 
+async def _alone(work: Callable[[], MatchPage], patience: float) -> MatchPage:
+    """Return what work gives, in a thread of its own, once no other does any.
+
+    Raises:
+        Overloaded: another one was not done in time.
+
+    """
+    turn = _TURN.get(None) or anyio.Lock()
+    _TURN.set(turn)
+    try:
+        with anyio.fail_after(patience):
+            await turn.acquire()
+    except TimeoutError:
+        raise Overloaded("another search is under way.", advice="Ask again in some seconds.") from None
+    try:
+        return await anyio.to_thread.run_sync(work, limiter=anyio.CapacityLimiter(1))
+    finally:
+        turn.release()
+
+
+def _until(patience: float) -> Callable[[float, str], None]:
+    """Return what gives a search up so many seconds from now [s], or when nobody waits for it any more."""
+    end = time.monotonic() + patience
+
+    def progress(share: float, what: str) -> None:
+        advice = "Ask again: what was looked at is kept. Or name a table, or say what is known."
+        waited.check(advice)
+        if time.monotonic() > end:
+            raise TimedOut(f"the search took more than {patience:.0f} s.", advice=advice)
+
+    return progress
+
+
 def _matched(
     body: bytes,
     media: str,
@@ -111,22 +149,11 @@ def _matched(
     table: str | None,
     known: Mapping[str, float],
     tables: LiveTables,
-    timeout: float,
+    progress: Callable[[float, str], None],
 ) -> MatchPage:
     # what reads and searches takes a while to import; the service starts without
     from . import answer, targets
 
+    progress(0.0, "reading")
     target = targets.read(body, sent.suffix_of(media, body, targets.KINDS, "target"), size)
-    end = time.monotonic() + _PATIENCE * timeout
-
-    def progress(share: float, what: str) -> None:
-        if time.monotonic() > end:
-            advice = "Ask again: what was looked at is kept. Or name a table, or say what is known."
-            raise TimedOut(f"the search took more than {_PATIENCE * timeout:.0f} s.", advice=advice)
-
-    if not _ONE.acquire(timeout=min(_WAIT, 0.5 * timeout)):
-        raise Overloaded("another search is under way.", advice="Ask again in some seconds.")
-    try:
-        return answer.match(target, tables, table, known, progress)
-    finally:
-        _ONE.release()
+    return answer.match(target, tables, table, known, progress)

@@ -203,11 +203,17 @@ def _pair(name: str, value: Any) -> tuple[float, float] | None:
     if isinstance(value, dict):  # as a shape's own page has it
         value = value.get("value")
     given = value if isinstance(value, list) else [value]
-    if not all(isinstance(one, int | float) and not isinstance(one, bool) and math.isfinite(one) for one in given):
+    if not all(isinstance(one, int | float) and not isinstance(one, bool) for one in given):
         return None
-    if len(given) == 2 and given[1] > 0:
-        return float(given[0]), float(given[1])
-    if len(given) != 1:
+    try:
+        numbers = [float(one) for one in given]
+    except OverflowError:  # more digits than any number has
+        return None
+    if not all(map(math.isfinite, numbers)):
+        return None
+    if len(numbers) == 2 and numbers[1] > 0:
+        return numbers[0], numbers[1]
+    if len(numbers) != 1:
         return None
     share = _TIGHT if name in _SIZES else _LOOSE
-    return float(given[0]), max(share * abs(float(given[0])), 1e-6)
+    return numbers[0], max(share * abs(numbers[0]), 1e-6)

@@ -25,6 +25,9 @@ __all__ = ["Instances", "bowl_of", "place"]
 
 #: Share of a heaped bowl's room that fruits fill, and how much higher than its rim they may heap.
 _FILLED, _HEAPED = 0.55, 1.6
+#: A bowl is no larger than so many of the largest fruits in it, which would fall for ever, and no smaller than this
+#: [scene unit]: numbers end somewhere.
+_LOST, _SMALLEST = 1e4, 1e-9
 #: How often somebody looks who waits for a heap that another one pours [s].
 _LOOK = 0.2
 
@@ -95,6 +98,9 @@ def place(
             raise InvalidScene.of([Wrong(f"places.{i}", error.message.rstrip("."), error.advice)]) from None
         except ValueError as error:
             raise InvalidScene.of([Wrong(f"places.{i}.{'mesh' if rule.mesh else 'radius'}", str(error), "")]) from None
+        if not (np.isfinite(rest.centre).all() and np.isfinite(rest.turn).all()):
+            advice = "Take sizes that are more alike, and neither tiny nor huge."
+            raise InvalidScene.of([Wrong(f"places.{i}", "numbers end before such things lie anywhere", advice)])
         centre[which] = rest.centre + rule.at
         turn[which] = rest.turn
         rests[rule.name] = rest
@@ -184,23 +190,45 @@ def _scatter(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Re
 def bowl_of(rule: Place) -> resting.Bowl:
     """Return the bowl of a place."""
     assert rule.radius is not None
-    return resting.Bowl(rule.radius, 0.05 * rule.radius)
+    return _bowl(rule.radius)
+
+
+def _bowl(radius: float) -> resting.Bowl:
+    return resting.Bowl(radius, 0.05 * radius)
 
 
 def _pour(rule: Place, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
     """Pour them; the result is kept, so that another camera or budget waits for no pile."""
     bowl = bowl_of(rule) if rule.rule == "bowl" else None
     if bowl is not None:
-        room = math.pi * (bowl.rim - bowl.thickness) ** 2 * (bowl.sphere - (bowl.rim - bowl.thickness) / 3)
-        volume = 4 / 3 * math.pi * float((_reach(found, kinds) ** 3).sum())
-        if volume * _FILLED > _HEAPED * room:
-            least = bowl.opening * (volume * _FILLED / (_HEAPED * room)) ** (1 / 3)
-            raise ValueError(f"{len(found.kind)} fruits heap over a bowl of {bowl.opening:g}: take {least:.3g} or more")
+        _check_bowl(bowl, _reach(found, kinds))
     used, kind = np.unique(found.kind, return_inverse=True)
     # the mirror image is a body of its own
     number = 2 * kind + found.mirrored
     shapes = tuple(_Told(kinds[k], mirrored) for k in used for mirrored in (False, True))
     return _heap(shapes, number.tobytes(), found.scale.tobytes(), bowl, rule.seed).rest()
+
+
+def _check_bowl(bowl: resting.Bowl, reach: Floats) -> None:
+    """Refuse a bowl that what lies in it heaps over, or is lost in.
+
+    Raises:
+        ValueError: it says how wide a bowl is to be.
+
+    """
+    # of a bowl that is 1 wide: lengths may be so small that their cubes are none
+    one, size = _bowl(1.0), float(reach.max())
+    high = one.rim - one.thickness
+    room = math.pi * high**2 * (one.sphere - high / 3)
+    volume = 4 / 3 * math.pi * float(((reach / size) ** 3).sum())
+    least = size * (volume * _FILLED / (_HEAPED * room)) ** (1 / 3)
+    if least > bowl.opening:
+        raise ValueError(f"{len(reach)} fruits heap over a bowl of {bowl.opening:g}: take {least:.3g} or more")
+    if bowl.opening < _SMALLEST:
+        raise ValueError(f"a bowl of {bowl.opening:g} is too small for numbers: take another unit of length")
+    if bowl.opening > _LOST * size:
+        said = f"fruits up to {2 * size:.3g} across are lost in a bowl of {bowl.opening:g}"
+        raise ValueError(f"{said}: take {_LOST * size:.3g} or less")
 
 
 class _Told:

@@ -36,6 +36,8 @@ FORMATS = {
 MOST = 20_000
 #: Most items with an entry of their own.
 MOST_ITEMS = 20_000
+#: When a curve ends at the latest [s]: what counts frames, or seconds in single precision, knows no later time.
+_LAST = 1e9
 
 Vector = tuple[float, float, float]
 Etag = Annotated[str, Field(pattern="^[0-9a-f]{16}$")]
@@ -192,6 +194,8 @@ class Item(_Strict):
         times = [at for at, _ in self.curve]
         if len(times) < 2 or times[0] < 0 or any(b <= a for a, b in pairwise(times)):
             raise ValueError("a curve has two or more pairs [seconds, stage], and its times rise, from 0 or later")
+        if times[-1] > _LAST:
+            raise ValueError(f"a curve ends within {_LAST:g} seconds: take another unit of time")
         if self.variants:
             raise ValueError("variants and a curve exclude each other: keep one of them")
         if self.full:

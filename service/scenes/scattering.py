@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -10,6 +12,7 @@ import numpy as np
 from solver import resting
 from solver.arrays import Array, Floats
 
+from ..limits import waited
 from .ground import Ground, across
 
 if TYPE_CHECKING:
@@ -20,6 +23,10 @@ __all__ = ["scatter"]
 
 #: How many places are tried for each individual before a mesh is called too small.
 _TRIES = 200
+#: Cells are as wide as two of the largest feet in them, and some more for what is rounded; feet so many times smaller
+#: have cells of their own. No cell is finer than this share of the mesh's largest coordinate.
+_WIDER, _STEP, _FINEST = 2.001, 4.0, 1e-9
+_AROUND = tuple(itertools.product((0, -1, 1), repeat=3))
 
 
 def scatter(ground: Ground, seed: int, found: Instances, kinds: Sequence[Kind]) -> resting.Rest:
@@ -64,10 +71,12 @@ def _feet(found: Instances, kinds: Sequence[Kind]) -> tuple[Floats, Floats]:
 def _apart(
     random: np.random.Generator, points: Floats, faces: Array, area: Floats, foot: Floats
 ) -> tuple[Floats, Array]:
-    """Return places (n, 3) and their triangles (n) for feet in their order, as many as find room."""
+    """Return places (n, 3) and their triangles (n) for feet, the largest first, as many as find room."""
     at, on = np.empty((len(foot), 3)), np.empty(len(foot), np.int64)
     share, taken = np.cumsum(area) / area.sum(), 0
+    feet = _Feet(float(np.abs(points).max()))
     for radius in foot:
+        waited.check()
         for _ in range(_TRIES):
             triangle = min(int(np.searchsorted(share, random.random(), side="right")), len(faces) - 1)
             u, v = random.random(2)
@@ -75,14 +84,40 @@ def _apart(
                 u, v = 1 - u, 1 - v
             a, b, c = points[faces[triangle]]
             place = a + u * (b - a) + v * (c - a)
-            away = ((at[:taken] - place) ** 2).sum(axis=1)
-            if (away >= (foot[:taken] + radius) ** 2).all():
+            x, y, z = place.tolist()
+            if feet.fits(x, y, z, float(radius)):
                 at[taken], on[taken] = place, triangle
                 taken += 1
                 break
         else:
             break
     return at[:taken], on[:taken]
+
+
+class _Feet:
+    """Feet that stand already, by cells of about their size: a new one looks at those in the cells around it alone."""
+
+    def __init__(self, extent: float) -> None:
+        # so that no number of a cell is beyond what floats tell apart
+        self._least = _FINEST * extent
+        self._levels: list[tuple[float, dict[tuple[int, int, int], list[tuple[float, float, float, float]]]]] = []
+
+    def fits(self, x: float, y: float, z: float, radius: float) -> bool:
+        """Return whether a foot, no larger than those before, overlaps none of them; then it stands there as well."""
+        for cell, feet in self._levels:
+            i, j, k = math.floor(x / cell), math.floor(y / cell), math.floor(z / cell)
+            for a, b, c in _AROUND:
+                for p, q, r, other in feet.get((i + a, j + b, k + c), ()):
+                    p, q, r, reach = p - x, q - y, r - z, other + radius
+                    if p * p + q * q + r * r < reach * reach:
+                        return False
+        cell = max(_WIDER * radius, self._least)
+        if not self._levels or cell < self._levels[-1][0] / _STEP:
+            self._levels.append((cell, {}))
+        cell, feet = self._levels[-1]
+        place = math.floor(x / cell), math.floor(y / cell), math.floor(z / cell)
+        feet.setdefault(place, []).append((x, y, z, radius))
+        return True
 
 
 def _standing(normal: Floats, angle: Floats) -> Floats:

@@ -21,6 +21,8 @@ _STEP, _FRICTION = 0.02, 0.5
 #: Speed below which a pile is at rest, where gravity and the mean radius are 1.
 _STILL = 0.02
 _BATCH, _LONGEST = 100, 40
+#: Bodies begin no farther from the middle than so many of the widest: all of a pile have room there, layer by layer.
+_WIDEST = 64
 #: Of so many bodies, a few always creep: such a heap is done when all but a hundredth have moved more slowly than this
 #: for a batch. Overlaps are then what they are at the end of the longest way (1,000 raisins: .031 in the mean, both).
 _MANY, _CREEP = 300, 0.12
@@ -179,6 +181,7 @@ def _poured(reach: Floats, opening: float, shell: Floats, random: np.random.Gene
     """
     cell = 2.05 * float(reach.max())
     wide = max(opening * 0.7 if opening else 0.75 * cell * len(reach) ** (1 / 3), 0.5 * cell)
+    wide = min(wide, _WIDEST * cell)
     span = np.arange(-int(wide / cell), int(wide / cell) + 1) * cell
     x, z = (grid.ravel() for grid in np.meshgrid(span, span))
     inside = np.hypot(x, z) <= wide

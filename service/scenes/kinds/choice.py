@@ -47,7 +47,8 @@ def distinct(
     rows: list[tuple[int, ...]] = []
     wrong: list[Wrong] = []
     for i, item in enumerate(items):
-        values: object = tuple(sorted(item.parameters.items()))
+        # True equals 1, and is no number
+        values: object = tuple((name, type(value) is bool, value) for name, value in sorted(item.parameters.items()))
         of_run = item.run, item.source, item.quality, item.full
         unlike = (item.differ, item.shapes, item.seed) if item.differ else None
         key = (item.solver, item.preset, values, item.stage, item.curve, item.shade, of_run, unlike, item.variants)
@@ -210,14 +211,19 @@ def _numbers(item: Item) -> dict[str, float]:
         InvalidQuery: some are no numbers.
 
     """
-    wrong = [
-        Wrong(f"parameters.{name}", "a table is asked by numbers", "Take a number, or say source = 'run'.")
-        for name, value in item.parameters.items()
-        if isinstance(value, bool) or not isinstance(value, float | int)
-    ]
+    found, wrong = dict[str, float](), []
+    for name, value in item.parameters.items():
+        try:
+            if isinstance(value, bool) or not isinstance(value, float | int):
+                advice = "Take a number, or say source = 'run'."
+                wrong.append(Wrong(f"parameters.{name}", "a table is asked by numbers", advice))
+            else:
+                found[name] = float(value)
+        except OverflowError:
+            wrong.append(Wrong(f"parameters.{name}", "is beyond all measure", "Take a number that a table holds."))
     if wrong:
         raise InvalidQuery.of(wrong)
-    return {name: float(value) for name, value in item.parameters.items()}
+    return found
 
 
 def _measured(item: Item, kinds: Sequence[Kind], name: str) -> list[Wrong]:

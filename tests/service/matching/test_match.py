@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
@@ -179,6 +182,8 @@ def test_masks_that_show_nothing_are_refused_with_advice() -> None:
         outline.read(_png(cut))
     with pytest.raises(Unreadable, match="no PNG"):
         outline.read(b"GIF89a")
+    with pytest.raises(Unreadable, match="16777216 in all: 1000 across are plenty"):
+        outline.read(_png(np.zeros((4096, 4097), np.uint8)))
 
 
 def _png(values: np.ndarray) -> bytes:
@@ -214,5 +219,24 @@ def test_over_http(tmp_path: Path) -> None:
         checked(client.post("/v1/match?table=defalt", json={"roughness": 1}), 404, "unknown-table")
         checked(client.post("/v1/match?known=te:7", json={"roughness": 1}), 422, "invalid-query")
         checked(client.post("/v1/match?size=1", json={"roughness": 1}), 422, "invalid-query")
+        # words and patterns that a table holds, and more digits than any number has
+        for known in ("imperfection_kind:1", "mirrors:1", "pattern:1", "pattern:1&table=wolfberry"):
+            checked(client.post(f"/v1/match?known={known}", json={"roughness": 1}), 422, "invalid-query")
+        for long in ("1" + "0" * 400, f"[0.04, {'1' + '0' * 400}]"):
+            body = f'{{"roughness": {long}}}'.encode()
+            said = client.post("/v1/match", content=body, headers={"Content-Type": "application/json"})
+            assert "roughness" in checked(said, 422, "invalid-query")["detail"]
         checked(client.post("/v1/match", content=b"v 0 0 0\n", headers=types), 422, "invalid-query")
         checked(client.post("/v1/match", content=b"{}", headers={"Content-Type": "image/png"}), 422, "invalid-query")
+
+
+def test_what_is_quickly_answered_does_not_wait_for_searches() -> None:
+    """Some wait for their turn; none takes the only thread from who asks whether all is well."""
+    with client_of(starter.ROOT, threads=1, max_delay=600.0) as client, ThreadPoolExecutor(4) as askers:
+        client.get("/healthz")  # opens the tables
+        ask = partial(client.post, "/v1/match?table=default", json={"roughness": 0.04}, timeout=120)
+        under_way = [askers.submit(ask) for _ in range(4)]
+        time.sleep(0.1)
+        assert client.get("/healthz").status_code == 200
+        assert not all(one.done() for one in under_way)
+        assert 200 in {one.result().status_code for one in under_way} <= {200, 503}

@@ -6,6 +6,7 @@ import io
 import json
 import math
 import struct
+import time
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,11 @@ from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
 from service.cli import app
+from service.errors import TimedOut
+from service.limits import waited
+from service.scenes import scattering
 from service.scenes.errors import InvalidScene
+from service.scenes.ground import across
 from service.scenes.request import parse
 from solver.registry import surface
 from store import starter
@@ -112,6 +117,61 @@ def test_places_follow_the_area_and_the_seed() -> None:
     assert np.abs(quarters - 0.25).max() < 0.06
     assert scattered(mesh, count, size=0.2).data == one.data
     assert scattered(mesh, count, size=0.2, seed=2).data != one.data
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_feet_stand_where_all_that_stand_already_are_looked_at(seed: int) -> None:
+    """Feet of all sizes on triangles of all sizes, near the origin or far from it, with room for all or not."""
+    random = np.random.default_rng(seed)
+    points = random.normal(size=(30, 3)) * 10.0 ** (seed - 4) + seed % 2 * 100.0
+    faces = np.arange(30).reshape(-1, 3)
+    area = np.linalg.norm(across(points, faces), axis=1)
+    wide = np.sqrt((0.05 + 0.1 * seed) * area.sum() / 500)
+    feet = np.sort(wide * 10.0 ** random.uniform(-(seed % 3), 0, 250))[::-1]
+    at, on = scattering._apart(np.random.default_rng(seed), points, faces, area, feet)
+    again, stood = np.random.default_rng(seed), 0
+    share = np.cumsum(area) / area.sum()
+    for foot in feet:
+        for _ in range(200):
+            triangle, (u, v) = np.searchsorted(share, again.random(), side="right"), again.random(2)
+            u, v = (1 - u, 1 - v) if u + v > 1 else (u, v)
+            a, b, c = points[faces[triangle]]
+            place = a + u * (b - a) + v * (c - a)
+            if (((at[:stood] - place) ** 2).sum(axis=1) >= (feet[:stood] + foot) ** 2).all():
+                break
+        else:
+            break
+        assert (at[stood] == place).all()
+        assert on[stood] == triangle
+        stood += 1
+    assert len(at) == stood
+
+
+SQUARE = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+
+
+def spread(count: int) -> int:
+    """Return how many of so many feet stood on a square of which they need two fifths."""
+    feet = np.full(count, math.sqrt(0.4 / math.pi / count))
+    faces, area = np.array([[0, 1, 2], [0, 2, 3]]), np.ones(2)
+    return len(scattering._apart(np.random.default_rng(0), SQUARE, faces, area, feet)[0])
+
+
+def test_who_waits_no_more_stops_what_is_scattered() -> None:
+    with waited.begin({}) as wait:
+        wait.over = True
+        with pytest.raises(TimedOut):
+            spread(10)
+
+
+def test_eight_times_as_many_take_about_eight_times_as_long() -> None:
+    """64 times where each is held against all others."""
+    times = []
+    for count in (700, 5600):
+        begin = time.process_time()
+        assert spread(count) > 0.9 * count
+        times.append(time.process_time() - begin)
+    assert times[1] < 20 * times[0]
 
 
 def test_usd_has_the_mesh_and_what_stands_on_it() -> None:

@@ -74,6 +74,14 @@ def test_individuals_take_turns_among_the_shapes() -> None:
     assert alike.report["meshes"] == 1
 
 
+@pytest.mark.parametrize("place", [0, 1])
+def test_what_is_no_number_is_not_taken_for_the_one_that_equals_it(place: int) -> None:
+    items = [{"preset": "raisin", "stage": 0.2, "parameters": {"seed": False if i == place else 0}} for i in (0, 1)]
+    with pytest.raises(InvalidScene) as caught:
+        make(parse({"camera": CAMERA, "items": items}), TABLES, 512, "json")
+    assert [one.name for one in caught.value.wrong] == [f"items.{place}.parameters.seed"]
+
+
 @pytest.mark.parametrize(
     ("change", "word"),
     [

@@ -162,6 +162,12 @@ def test_a_budget_is_kept_by_less_detail() -> None:
     assert tight.report["items"][0]["reduced"] == 35
 
 
+def _poured(radius: float | None, size: float = 1.0, other: float | None = None) -> dict[str, Any]:
+    """A bowl, or without a radius a pile, in which two things lie."""
+    place = {"name": "b", "rule": "bowl", "radius": radius} if radius else {"name": "b", "rule": "pile"}
+    return {"items": [{**RAISIN, "size": one or size, "place": "b"} for one in (size, other)], "places": [place]}
+
+
 WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"items": [{"preset": "raisn", "stage": 0.2}]}, "invalid-scene", "raisin"),
     ({"items": [{"preset": "raisin", "stage": 0.9}]}, "invalid-scene", "items.0.s"),
@@ -177,6 +183,13 @@ WRONG: list[tuple[dict[str, Any], str, str]] = [
     ({"items": [at([0, 0, 0], [1, 0, 0])], "budget": {"triangles": 300}}, "over-budget", "Drop the 1 smallest of 2"),
     ({"items": [{**RAISIN, "colour": "red"}]}, "invalid-scene", "colour"),
     ({"items": [{"preset": "orange", "source": "table", "stage": 3}]}, "invalid-scene", "table"),
+    ({"items": [{**RAISIN, "parameters": {"te": 10**400}}]}, "invalid-scene", "beyond all measure"),
+    ({"items": [{"preset": "raisin", "curve": [[0, 0.1], [1e154, 0.2]]}]}, "invalid-scene", "ends within"),
+    (_poured(1e-320), "invalid-scene", "heap over"),
+    (_poured(1e-320, size=1e-321), "invalid-scene", "too small"),
+    (_poured(1e6, size=1e-3), "invalid-scene", "are lost in"),
+    (_poured(4.0, size=1e-320), "invalid-scene", "are lost in"),
+    (_poured(None, size=1e-320, other=1.0), "invalid-scene", "numbers end"),
 ]
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -104,6 +106,18 @@ def test_nothing_is_thrown_out_of_a_bowl_with_room(opening: float, seed: int) ->
     """Five balls start beside each other where the bowl is wide enough for that, and not in its wall."""
     rest = settle(BODIES[:1], [0] * 5, np.ones(5), Bowl(opening, 0.15), seed)
     assert np.hypot(rest.centre[:, 0], rest.centre[:, 2]).max() < opening
+
+
+@pytest.mark.parametrize("opening", [3e3, 1e9])
+def test_a_bowl_costs_what_is_in_it_however_wide_it_is(opening: float) -> None:
+    tracemalloc.start()
+    try:
+        pouring = Pouring(BODIES[:1], [0] * 3, np.ones(3), Bowl(opening, 1.0), 0)
+        assert tracemalloc.get_traced_memory()[1] < 10e6
+    finally:
+        tracemalloc.stop()
+    assert np.isfinite(pouring.centre).all()
+    assert np.hypot(pouring.centre[:, 0], pouring.centre[:, 2]).max() < opening
 
 
 def test_a_pile_of_too_many_is_refused() -> None:
