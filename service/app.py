@@ -139,10 +139,11 @@ def create_app(settings: Settings | None = None, is_warmed: bool = False) -> Fas
 def _surround(app: FastAPI, settings: Settings, metrics: Metrics) -> None:
     """Put around the routes what a request passes on its way to them; the last one added is the outermost."""
     load = Load(settings.threads, min(settings.max_delay, settings.timeout))
-    app.state.door = Door(settings, load, partial(app.state.answers.is_kept, app.state), partial(record, metrics))
+    is_kept = partial(app.state.answers.is_kept, app.state)
+    app.state.door = Door(settings, load, app.state.tokens, is_kept, partial(record, metrics))
     if settings.public_read:
         app.add_middleware(Shortcut, state=app.state)
-    app.add_middleware(Admission, load=load)
+    app.add_middleware(Admission, load=load, tokens=app.state.tokens)
     app.add_middleware(Limits, settings=settings, is_patient=lambda: app.state.compiling.is_under_way)
     if settings.public_read and settings.cache_bytes:
         app.add_middleware(Repeats, state=app.state)

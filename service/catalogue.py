@@ -18,6 +18,7 @@ from . import page, portraits, problems, vocabulary
 from .errors import UnknownPreset
 from .formats import FORMATS
 from .sequences import EXPORTS
+from .settings import Settings
 from .shapes.live import LiveTables
 from .views.addresses import link
 from .views.catalogue import Health, Index, SolverList, SolverPage, TableList, TablePage
@@ -168,7 +169,8 @@ def portrait(
             advice=f"Those of {', '.join(portraits.said(known.name)) or 'no preset'} are there.",
         )
     tag = f'"{hashlib.sha256(data).hexdigest()[:32]}"'
-    headers = {"ETag": tag, "Cache-Control": "public, max-age=86400"}
+    settings: Settings = request.app.state.settings
+    headers = {"ETag": tag, "Cache-Control": settings.kept(86400)}
     if matches(request.headers.get("if-none-match", ""), tag):
         return Response(status_code=304, headers=headers)
     return Response(data, headers=headers, media_type="image/png")

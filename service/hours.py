@@ -22,7 +22,7 @@ router = APIRouter(tags=["catalogue"])
 UNDER = "[a-z_]+:[A-Za-z0-9.+-]+(,[a-z_]+:[A-Za-z0-9.+-]+)*"
 #: What to do where a name is given twice.
 _ONCE = {"hours": "Give it once: each answer is of one stage.", "under": "Write conditions with commas between."}
-_HOURS = r"[0-9]+(\.[0-9]+)?(,[0-9]+(\.[0-9]+)?)*"
+_HOUR = r"[0-9]+(\.[0-9]+)?(e-?[0-9]+)?"
 
 
 class Stages(BaseModel):
@@ -39,22 +39,28 @@ class Stages(BaseModel):
 def stages(
     name: Annotated[str, Path(description="Name of a solver; GET /v1/solvers lists them")],
     hours: Annotated[
-        str, Query(pattern=f"^{_HOURS}$", max_length=2000, description="Hours, with commas between", examples=["24,48"])
+        str,
+        Query(
+            max_length=2000,
+            description="Hours, with commas between",
+            examples=["24,48"],
+            json_schema_extra={"pattern": f"^{_HOUR}(,{_HOUR})*$"},
+        ),
     ],
     under: Annotated[
         str,
         Query(
-            pattern=f"^({UNDER})?$",
             max_length=2000,
             description="Conditions as name:value, with commas between",
             examples=["temperature:60,air_speed:1,diameter:22"],
+            json_schema_extra={"pattern": f"^({UNDER})?$"},
         ),
     ] = "",
     preset: Annotated[str | None, Query(description="Named parameters whose fruit dries")] = None,
 ) -> Stages:
     """Turn hours of drying into stages, for presets and conditions that were measured; others are refused by name."""
     solver = vocabulary.solver_named(name)
-    asked, conditions = [float(text) for text in hours.split(",")], _conditions(under)
+    asked, conditions = _hours(hours), _conditions(under)
     return Stages(
         hours=asked,
         stages=list(_after(solver, asked, conditions, preset)),
@@ -85,7 +91,7 @@ def timed(items: Sequence[tuple[str, str]], solver: Solver, preset: str | None =
         advice = f"Give hours= in place of {symbol}, or leave under out."
         wrong.append(Wrong("under", "says how hours are spent, and there are none", advice))
     elif hours is None:
-        detail = f"{given['hours'][:40]!r} is not a number of hours" if "hours" in given else "is missing"
+        detail = _no_hours(given["hours"]) if "hours" in given else "is missing"
         wrong.append(Wrong("hours", detail, "Write it like hours=48."))
     if wrong or hours is None:
         raise InvalidQuery.of(wrong)
@@ -96,6 +102,24 @@ def timed(items: Sequence[tuple[str, str]], solver: Solver, preset: str | None =
         name, advice = _blamed(solver, under, preset), error.advice or "Write it like under=temperature:60."
         raise InvalidQuery.of([Wrong(name, error.message.rstrip("."), advice)]) from None
     return [*kept, (symbol, repr(stage))]
+
+
+def _hours(text: str) -> list[float]:
+    """Return the hours in a text with commas between.
+
+    Raises:
+        InvalidQuery: naming each that is no number.
+
+    """
+    parts = {part: number_of(part) for part in text.split(",")}
+    wrong = [Wrong("hours", _no_hours(part), "Write it like hours=24,48.") for part in parts if parts[part] is None]
+    if wrong:
+        raise InvalidQuery.of(wrong)
+    return [found for part in text.split(",") if (found := parts[part]) is not None]
+
+
+def _no_hours(text: str) -> str:
+    return f"{text[:40]!r} is not a number of hours"
 
 
 def _after(solver: Solver, hours: Sequence[float], under: Mapping[str, str], preset: str | None) -> tuple[float, ...]:

@@ -18,6 +18,7 @@ from store.tables import TableInfo
 from sweeps import families as covering
 
 from . import portraits, problems, vocabulary
+from .settings import Settings
 from .shapes.live import LiveTables
 from .views.addresses import link
 from .views.tags import matches
@@ -26,6 +27,7 @@ __all__ = ["listed", "router"]
 
 #: Other pictures of the same tables have other addresses and tags: browsers keep them for a day.
 _DRAWN = "-2"
+_DAY = 86400
 _LISTING = threading.Lock()
 router = APIRouter(tags=["catalogue"])
 
@@ -79,14 +81,27 @@ def _said(live: LiveTables, name: str) -> dict[str, Any]:
 def thumbnail(request: Request, name: str = Path(description="Name of a table; GET /v1/maps lists them")) -> Response:
     """Draw a family's preset, or its middle sample, dried up."""
     live: LiveTables = request.app.state.tables
+    settings: Settings = request.app.state.settings
     info, _, families = _known(live, name)
-    headers = {"ETag": f'"{info.digest[:32]}-thumbnail{_DRAWN}"', "Cache-Control": "public, max-age=86400"}
-    if matches(request.headers.get("if-none-match", ""), headers["ETag"]):
-        return Response(status_code=304, headers=headers)
-    found = portraits.of_table(info.digest)
+    # while a new generation is opened, the picture is still of the old one
+    table = live.get(name) if live.is_open(name) else None
+    digest = info.digest if table is None else table.digest
+    if matches(request.headers.get("if-none-match", ""), _tag(digest)):
+        return Response(status_code=304, headers=_headers(settings, digest, info.digest))
+    found = portraits.of_table(digest)
     if found is None:
-        found = _drawn(live.get(name), families, live.store)
-    return Response(found, headers=headers, media_type="image/png")
+        table = table or live.get(name)
+        digest, found = table.digest, _drawn(table, families, live.store)
+    return Response(found, headers=_headers(settings, digest, info.digest), media_type="image/png")
+
+
+def _headers(settings: Settings, digest: str, newest: str) -> dict[str, str]:
+    """Return the headers of a picture of one generation: its address names the newest, and is kept for that alone."""
+    return {"ETag": _tag(digest), "Cache-Control": settings.kept(_DAY) if digest == newest else "no-cache"}
+
+
+def _tag(digest: str) -> str:
+    return f'"{digest[:32]}-thumbnail{_DRAWN}"'
 
 
 @router.get(

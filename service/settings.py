@@ -68,7 +68,9 @@ class Settings(BaseSettings):
         description="Pages elsewhere that may ask, by origin, e.g. `https://a.example,https://b.example`; `*`: all",
     )
     compress: Literal["off", "elsewhere", "always"] = Field(
-        "elsewhere", description="Whose answers are compressed (zstd, br, gzip): none, those to other machines, or all"
+        "elsewhere",
+        description="Whose answers are compressed (zstd, br, gzip): `off`, none; `elsewhere`, those to other machines; "
+        "`always`, all",
     )
     root_path: str = Field(
         "", pattern=r"^(/[A-Za-z0-9._~-]+)*$", description="Where a proxy serves this, e.g. `/wizen`"
@@ -112,6 +114,10 @@ class Settings(BaseSettings):
                     f"{part!r} is no origin: write scheme, host and port alone, e.g. https://a.example:8443"
                 )
         return parts
+
+    def kept(self, seconds: int) -> str:
+        """Return the Cache-Control of what may be used again for so long; by its asker alone, if that takes a token."""
+        return f"{'public' if self.public_read else 'private'}, max-age={seconds}"
 
 
 def page() -> str:

@@ -19,9 +19,12 @@ from store.errors import StoreError
 
 from . import problems
 
-__all__ = ["LOGGER", "Metrics", "Telemetry", "record"]
+__all__ = ["HEAD", "LOGGER", "Metrics", "Telemetry", "record"]
 
 LOGGER = logging.getLogger("wizen.service")
+
+#: Says of a scope whose method is GET that its body is sent to nobody.
+HEAD = "wizen.head"
 
 _BUCKETS = (0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 1.0, 5.0)
 
@@ -93,7 +96,8 @@ class Telemetry:
             await send(message)
 
         if method == "HEAD":
-            scope = {**scope, "method": "GET"}  # the server's own still says that no body is to be sent
+            # the server's own still says that no body is to be sent
+            scope = {**scope, "method": "GET", HEAD: True}
         try:
             await self.app(scope, receive, watched)
         except Exception:

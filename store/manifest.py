@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ from solver.contract import Quality
 
 from . import seal
 from .canonical import canonical
-from .errors import CorruptTable, UnknownTable
+from .errors import CorruptTable, OutsideTable, UnknownTable
 from .families.ties import Tie
 
 __all__ = ["TableInfo", "directory", "read_manifest", "write_manifest"]
@@ -53,10 +53,32 @@ class TableInfo:
     plan: str = ""
 
     def complete(self, values: Mapping[str, float]) -> dict[str, float]:
-        """Return values on the axes, and with them those of the parameters that follow."""
-        if not self.tied:
-            return dict(values)
-        return {**values, **{name: tie(values[tie.leader]) for name, tie in self.tied.items() if tie.leader in values}}
+        """Return values on the axes, and with them those of the parameters that follow.
+
+        Raises:
+            OutsideTable: nobody knows what follows there.
+
+        """
+        return {**values, **self.following(values)} if self.tied else dict(values)
+
+    def following(self, values: Mapping[str, float], given: Collection[str] = ()) -> dict[str, float]:
+        """Return the values of the parameters that follow those on the axes, but of the `given` ones.
+
+        Raises:
+            OutsideTable: nobody knows them there; which, and to what end they are known.
+
+        """
+        ties = {name: tie for name, tie in self.tied.items() if tie.leader in values and name not in given}
+        found = {name: tie.beyond(values[tie.leader]) for name, tie in ties.items()}
+        lost = [name for name, value in found.items() if value is None]
+        if lost:
+            tie = ties[lost[0]]
+            raise OutsideTable(
+                f"what goes with {tie.leader} = {values[tie.leader]:.9g} is not known: table {self.name!r} has "
+                f"{', '.join(lost)} follow it from {tie.at[0]:.12g} to {tie.at[-1]:.12g}.",
+                f"Say {', '.join(lost)} as well, or stay within it.",
+            )
+        return {name: value for name, value in found.items() if value is not None}
 
     @property
     def quality(self) -> Quality:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -248,7 +249,10 @@ def save(path: Path, made: Made) -> None:
 def of_result(result: xr.Dataset, params: Mapping[str, float], index: int) -> Shape:
     """Return one stage of a run with the field `position` as a shape; its poles come from the spectrum, and its
     `crossings` are counted with them: a run's own `lattice_crossings` are of the lattice closed by its rings' means.
+
+    What was relaxed from a table is no stored run of it; how near one lies is not known here.
     """
+    is_relaxed = result.attrs.get("path") == "relaxed"
     position = result["position"].isel(stage=index).values
     poles = spectra.poles(spectra.spectrum(position))
     numbers = {
@@ -266,10 +270,10 @@ def of_result(result: xr.Dataset, params: Mapping[str, float], index: int) -> Sh
         parameters=params,
         descriptors=numbers,
         weights={},
-        nearest=0.0,
-        exact=True,
+        nearest=math.nan if is_relaxed else 0.0,
+        exact=not is_relaxed,
         converged=bool(result["converged"][index]),
         crossings=apart.crossings(position, poles),
         table="",
-        tier="relaxed" if result.attrs.get("path") == "relaxed" else "run",
+        tier="relaxed" if is_relaxed else "run",
     )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from store.shape import Shape
     from store.store import Store
 
-__all__ = ["begun", "lattice_of", "relaxed", "starts"]
+__all__ = ["begun", "lattice_of", "looked_up", "relaxed", "starts"]
 
 #: How many times finer than the table's own is the lattice from which a shape is laid on the mesh, which reads it as
 #: linear between its points: with two points to the shortest wave, ridges are cut off. What relaxing moves of runs
@@ -60,7 +60,8 @@ def relaxed(
     context: finds the pattern that the table's runs start from; without one only those in the package are found.
     Without a quality it is that of the table's runs: on another mesh their shapes are no equilibria, and slide away.
     It starts from the table's own waves, whatever lattice it is wanted on, and is closed at the poles as a run's stage
-    is (`outputs.of_result`): a job that relaxes the same shape hands over the same points.
+    is (`outputs.of_result`): a job that relaxes the same shape hands over the same points. The fresh shape is in
+    balance as it is, and comes back as it was, with nothing said of it.
 
     Raises:
         InvalidInput: the solver relaxes nothing, or refuses the parameters; or the pattern is not there.
@@ -72,6 +73,8 @@ def relaxed(
 
     if shape.position is None:
         raise ValueError("look the shape up with its position")
+    if shape.stage == 0:
+        return shape, {}
     asked = {axis: shape.parameters[axis] for axis in table.axes}
     start = begun(table, asked, shape.stage, shape.method, lattice_of(table))
     told = tuple(name for name in table.info.descriptors if name in solver.fields)
@@ -102,6 +105,22 @@ def relaxed(
     return made, said
 
 
+def looked_up(
+    table: ShapeTable, start: Start, params: Mapping[str, Any], stage: float, resolution: int
+) -> dict[str, Any]:
+    """Return what a table says of the shape that a job relaxed, as fields of a shape: what `relaxed` leaves as it was.
+
+    Raises:
+        OutsideTable: there is no such shape in it.
+
+    """
+    from store.generations.samples import read_axes
+
+    values = read_axes(params, {axis: table.info.places[axis] for axis in table.axes})
+    shape = table.at(values, stage, resolution=resolution, fields=(), method=start.method)
+    return {name: getattr(shape, name) for name in ("nearest", "inside", "held", "weights")}
+
+
 def starts(store: Store) -> Callable[[Start, Params, float], Floats]:
     """Return how a run finds the looked-up position that it starts from: `starts` of a `Context`.
 
@@ -114,10 +133,10 @@ def starts(store: Store) -> Callable[[Start, Params, float], Floats]:
 
         table = _meant(store.root, start)
         values = read_axes(params.model_dump(mode="json"), {axis: table.info.places[axis] for axis in table.axes})
-        asked = InvalidInput("these parameters are not the table's.", advice="Ask for the shape with exact=relax.")
-        if table.at_parameters(values) != params.model_dump(mode="json"):
-            raise asked
         try:
+            if table.at_parameters(values) != params.model_dump(mode="json"):
+                advice = "Ask for the shape with exact=relax."
+                raise InvalidInput("these parameters are not the table's.", advice=advice)
             return begun(table, values, stage, start.method, start.lattice)
         except OutsideTable as error:
             raise InvalidInput(error.message, advice=error.advice) from error

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -65,6 +66,7 @@ def extras(shape: Shape, about: About) -> dict[str, Any]:
         **({"made": dict(about.made)} if about.made else {}),
         "stage": {"symbol": about.stage_symbol, "value": shape.stage},
         **shape.trust(),
+        "nearest": shape.nearest if math.isfinite(shape.nearest) else None,
         "volume": shape.volume,
         "method": shape.method,
         "units": {"length": LENGTH_UNIT, **({"metres": about.metres} if about.metres else {}), **about.units},

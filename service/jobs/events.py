@@ -21,6 +21,7 @@ from .. import problems
 from ..errors import TooManyListeners
 from ..limits.clients import client_of
 from ..settings import Settings
+from ..telemetry import HEAD
 from .routes import JobId, stored_job
 from .views import ENDED, view
 
@@ -70,7 +71,7 @@ async def events(
     job: Job = await look()
     if job.state in ENDED and last_event_id == _id(job):
         return Response(status_code=204)  # tells a browser not to come back
-    client, listeners = client_of(request.scope), request.app.state.listeners
+    client, listeners = client_of(request.scope, request.app.state.tokens), request.app.state.listeners
     settings: Settings = request.app.state.settings
     for count, most, whose in (
         (listeners.total(), settings.max_listeners, ""),
@@ -82,6 +83,8 @@ async def events(
             )
 
     async def stream() -> AsyncIterator[bytes]:
+        if HEAD in request.scope:
+            return  # nobody listens
         listeners[client] += 1
         try:
             yield f"retry: {_RETRY}\n\n".encode()

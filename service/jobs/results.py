@@ -9,7 +9,7 @@ import mimeparse
 from fastapi import APIRouter, Depends, Query, Request
 from starlette.responses import FileResponse, Response
 
-from solver import registry
+from solver import __version__, registry
 from store import seal
 from store.errors import CorruptShard, UnknownJob
 from store.ledger.jobs import Job
@@ -26,7 +26,7 @@ from ..views.tags import matches
 from . import choices
 from . import fields as jobs_fields
 from .routes import JobId, check_done, stored_job
-from .staged import NETCDF, encode, is_surface
+from .staged import NETCDF, begun_from, encode, is_surface
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -119,12 +119,13 @@ def result(
     store: Store = request.app.state.tables.store
     settings: Settings = request.app.state.settings
     asked = options.model_dump(exclude_defaults=True)
-    tag = _tag(job, name, {"stage": stage, "fields": fields, **asked})
+    table = None if chosen is None else begun_from(job, request.app.state.tables.get)
+    tag = _tag(job, name, {"stage": stage, "fields": fields, "from": table and table.info.name, **asked})
     headers = {
         "ETag": tag,
         "Vary": "Accept",
         "Wizen-Tier": "run" if job.need.get("start") is None else "relaxed",
-        "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
+        "Cache-Control": settings.kept(settings.cache_age),
     }
     held = request.headers.get("if-none-match", "")
     if matches(held, tag, there=chosen is None):
@@ -137,7 +138,7 @@ def result(
     elif isinstance(chosen, Export) or (chosen.name in STILLS and _is_scene(run, asked)):
         body = _scene(run, stage, chosen, options, settings)
     else:
-        body = encode(run, job, stage, chosen)
+        body = encode(run, job, stage, chosen, table)
     if matches(held, tag):  # whether there is such a file of it is known when it is made
         return Response(status_code=304, headers=headers)
     if chosen.name != "json":
@@ -148,7 +149,9 @@ def result(
 def _tag(job: Job, name: str, said: dict[str, Any]) -> str:
     """Return the entity tag of a result in a format, with what was said about it."""
     word = "".join(f"-{key}={value!r}" for key, value in sorted(said.items()) if value is not None)
-    return f'"{job.digest}-{name}{quote(word, safe="=-")}"'
+    # what a file says besides, and how, may be another in the next version; the netCDF is the stored one
+    version = "" if name == "netcdf" else f"-{__version__}"
+    return f'"{job.digest}-{name}{version}{quote(word, safe="=-")}"'
 
 
 def _filename(run: xr.Dataset, job: Job, stage: float | None, chosen: Format | Export) -> str:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from solver import registry
-from solver.contract import Params, Solver, SolverError
+from solver.contract import Params, Solver, SolverError, Start
 from solver.lattice import lattice
+from store.errors import StoreError
 from store.ledger.jobs import Job
 
 from .. import vocabulary
@@ -19,7 +20,9 @@ from ..formats import About, Format
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["NETCDF", "encode", "is_surface"]
+    from store.lookup import ShapeTable
+
+__all__ = ["NETCDF", "begun_from", "encode", "is_surface"]
 
 NETCDF = "application/x-netcdf"
 
@@ -30,8 +33,20 @@ def is_surface(run: xr.Dataset, job: Job) -> bool:
     return whole and ("position" in run or "displacement" in run)
 
 
-def encode(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> bytes:
-    """Return one stage of a run in a format of the shapes.
+def begun_from(job: Job, tables: Callable[[str], ShapeTable]) -> ShapeTable | None:
+    """Return the table whose shape a job relaxed, None where it relaxed none or that content is no longer there."""
+    start: Mapping[str, Any] = job.need.get("start") or {}
+    if not start:
+        return None
+    try:
+        found = tables(str(start["table"]))
+    except (StoreError, OSError):
+        return None
+    return found if found.digest == start["digest"] else None
+
+
+def encode(run: xr.Dataset, job: Job, stage: float | None, chosen: Format, table: ShapeTable | None) -> bytes:
+    """Return one stage of a run in a format of the shapes; `table` is the one that it was relaxed from.
 
     Raises:
         NotAcceptable: the result is no whole surface.
@@ -40,6 +55,7 @@ def encode(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> by
     """
     from sweeps.outputs import of_result
     from sweeps.pictures.colours import shade
+    from sweeps.relaxing import looked_up
 
     solver = vocabulary.solver_named(job.solver)
     params = _params(solver, job)
@@ -53,10 +69,13 @@ def encode(run: xr.Dataset, job: Job, stage: float | None, chosen: Format) -> by
         raise NotAcceptable("this result is not a whole surface.", advice=advice)
     axes = vocabulary.axes(job.solver)
     start: Mapping[str, Any] = job.need.get("start") or {}
+    rows = run.sizes["colatitude"]
+    begun = {} if table is None else looked_up(table, Start(**start), job.params, stages[near], rows)
     shape = replace(
         of_result(run, {name: params.axis(name) for name in axes}, near),
         table=start.get("digest", str(job.digest)),
         method=start.get("method", ""),
+        **begun,
     )
     symbol = solver.stages.symbol
     units = {**{name: axis.units for name, axis in axes.items()}, symbol: solver.stages.units}

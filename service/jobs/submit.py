@@ -8,11 +8,13 @@ from typing import Any, NamedTuple
 from fastapi import Request
 from fastapi.datastructures import State
 
-from solver.contract import Need, Params, Quality, Solver
+from solver.contract import InvalidInput, Need, Params, Quality, Solver
+from solver.rounding import from_zero, towards_zero
+from store.keys import is_key
 from store.ledger.asks import Asker, Spending
 from store.ledger.jobs import Job, JobSpec
 from store.ledger.queue import Queue, Quota
-from store.starter import check_own
+from store.starter import check_own, has
 from store.store import Store
 from store.tokens import Token
 
@@ -22,7 +24,7 @@ from ..settings import Settings
 from ..views.addresses import link
 from .views import remember
 
-__all__ = ["Submitted", "asker_of", "submit"]
+__all__ = ["Submitted", "asker_of", "check_begun", "submit"]
 
 
 def asker_of(request: Request, token: Token) -> Asker:
@@ -66,7 +68,7 @@ def submit(
         unlimited: for administrators: no quota, no limit of cost.
 
     Raises:
-        InvalidInput: the solver refuses the parameters or the need.
+        InvalidInput: the solver refuses the parameters or the need, or starts from a result that is not there.
         TooCostly: more than the operator allows.
         QueueFull: too many jobs wait already.
         QuotaSpent: too much time was asked for lately.
@@ -88,8 +90,26 @@ def submit(
     cost = solver.cost(values, settled)
     remember(spec.key, cost, said)
     lost = not store.has(spec.key)
+    if lost:
+        check_begun(store, spec.params)
     job, new = Queue(store.ledger).ask(spec, owner, quota, again=again, lost=lost, expected=cost.seconds)
     return Submitted(job, new)
+
+
+def check_begun(store: Store, params: Mapping[str, Any]) -> None:
+    """Refuse a run that starts from a stored result, as from the pattern of another run, which is not here.
+
+    Raises:
+        InvalidInput: naming it.
+
+    """
+    for name, value in params.items():
+        key = value.get("key") if isinstance(value, Mapping) else None
+        if isinstance(key, str) and is_key(key) and not (store.has(key) or has(key)):
+            raise InvalidInput(
+                f"{name}.key: no result is stored under {key}, which the run starts from.",
+                advice="Run that one first: GET /v1/results lists what there is.",
+            )
 
 
 def _weigh(solver: Solver, params: Params, need: Need, settings: Settings) -> None:
@@ -101,9 +121,10 @@ def _weigh(solver: Solver, params: Params, need: Need, settings: Settings) -> No
     """
     seconds, memory = _cost(solver, params, need)
     if seconds > settings.max_job_seconds:
-        what = f"take about {seconds:.0f} s, longer than the {settings.max_job_seconds:g} s"
+        what = f"take about {from_zero(seconds)} s, longer than the {settings.max_job_seconds:g} s"
     elif memory > settings.max_job_bytes:
-        what = f"need about {memory / 1e9:.3g} GB, more than the {settings.max_job_bytes / 1e9:.3g} GB"
+        limit = towards_zero(settings.max_job_bytes / 1e9)
+        what = f"need about {from_zero(memory / 1e9)} GB, more than the {limit} GB"
     else:
         return
     raise TooCostly(f"this run would {what} that one job may.", advice=_cheaper(solver, params, need))
@@ -128,7 +149,7 @@ def _cheaper(solver: Solver, params: Params, need: Need) -> str:
         first = need.stages[:1]
         tries[f"stage {first[0]:g} alone"] = need.model_copy(update={"stages": first})
     said = [
-        f"{name} would take about {seconds:.0f} s and {memory / 1e9:.2g} GB"
+        f"{name} would take about {from_zero(seconds)} s and {from_zero(memory / 1e9, 2)} GB"
         for name, (seconds, memory) in ((name, _cost(solver, params, other)) for name, other in tries.items())
     ]
     known = f" ({'; '.join(said)})" if said else ""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from collections import OrderedDict
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
@@ -26,9 +28,11 @@ _LONG = 2000
 #: What is known of jobs before they run, by their keys, which say all that it hangs on; and of how many.
 _KNOWN: dict[str, Beforehand] = {}
 _MANY = 2000
-#: What lists show of jobs with parameters that are too long for them, by their keys; and of how many.
-_SHORT: dict[str, Shortened] = {}
-_FEW = 100
+#: What lists show of jobs with parameters that are too long for them, by their keys, those asked for last at the end;
+#: and of how many: more than a page has, or the first of it would be forgotten before it is asked for again.
+_SHORT: OrderedDict[str, Shortened] = OrderedDict()
+_FEW = 500
+_GUARD = threading.Lock()
 
 
 class JobRequest(BaseModel):
@@ -137,15 +141,18 @@ class Shortened(NamedTuple):
 
 def _shortened(job: Job) -> Shortened:
     """Return what lists show of a job's parameters; a mesh is read once for it, and not at every look at the job."""
-    known = _SHORT.get(job.key)
-    if known is not None:
-        return known
+    with _GUARD:
+        known = _SHORT.get(job.key)
+        if known is not None:
+            _SHORT.move_to_end(job.key)
+            return known
     omitted = [name for name, value in job.params.items() if _size(value, _LONG) > _LONG]
     found = Shortened({name: value for name, value in job.params.items() if name not in omitted}, omitted)
     if omitted:
-        if len(_SHORT) >= _FEW:
-            _SHORT.clear()
-        _SHORT[job.key] = found
+        with _GUARD:
+            _SHORT[job.key] = found
+            while len(_SHORT) > _FEW:
+                _SHORT.popitem(last=False)
     return found
 
 

@@ -16,6 +16,8 @@ from collections.abc import Callable
 from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from store.tokens import Tokens
+
 from .. import problems
 from ..errors import Overloaded
 from .clients import client_of
@@ -105,17 +107,18 @@ class Admission:
     health costs next to nothing and always passes.
     """
 
-    def __init__(self, app: ASGIApp, load: Load) -> None:
+    def __init__(self, app: ASGIApp, load: Load, tokens: Tokens) -> None:
         self.app = app
         self.load = load
+        self.tokens = tokens
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request on if there is room for it; it counts until its answer begins."""
         if scope["type"] != "http" or not _is_work(scope["path"]):
             await self.app(scope, receive, send)
             return
-        client, load = client_of(scope), self.load
-        response = refusal(load, scope)
+        client, load = client_of(scope, self.tokens), self.load
+        response = refusal(load, scope, client)
         if response is not None:
             await response(scope, receive, send)
             return
@@ -138,11 +141,13 @@ class Admission:
             begin(is_done=True)
 
 
-def refusal(load: Load, scope: Scope, is_known: bool = True) -> Response | None:
-    """Return what to answer to a request that there is no time for, None if there is; `is_known`: who sends it."""
+def refusal(load: Load, scope: Scope, client: str | None) -> Response | None:
+    """Return what to answer to a request that there is no time for, None if there is; without a `client` nobody knows
+    who sends it.
+    """
     if not _is_work(scope["path"]):
         return None
-    wait = load.refused(client_of(scope) if is_known else None)
+    wait = load.refused(client)
     if wait is None:
         return None
     # unless one before us did

@@ -2,22 +2,40 @@
 
 from __future__ import annotations
 
-import hashlib
 import ipaddress
 from functools import lru_cache
 
+from fastapi.security.utils import get_authorization_scheme_param
 from starlette.types import Scope
+
+from store.errors import CorruptTokens
+from store.tokens import Token, Tokens
 
 __all__ = ["address", "client_of"]
 
 
-def client_of(scope: Scope) -> str:
-    """Return a name of whoever sent a request: by its token, else by its address."""
+def client_of(scope: Scope, tokens: Tokens) -> str:
+    """Return a name of whoever sent a request: by a token that is known, else by its address.
+
+    Where reading is free nobody looks whether a token is one: named by what was sent, a client would be as many as it
+    pleases.
+    """
     for name, value in scope["headers"]:
         if name == b"authorization":
-            return f"token {hashlib.blake2b(value, digest_size=8).hexdigest()}"
+            token = _token(value.decode("latin-1"), tokens)
+            if token is not None:
+                return f"token {token.id}"
     client = scope.get("client")
     return address(client[0] if client else "")
+
+
+def _token(sent: str, tokens: Tokens) -> Token | None:
+    scheme, secret = get_authorization_scheme_param(sent)
+    try:
+        found = tokens.find(secret) if scheme.lower() == "bearer" else None
+    except CorruptTokens:
+        return None  # whoever needs one is told
+    return None if found is None or found.expired else found
 
 
 @lru_cache(maxsize=4096)

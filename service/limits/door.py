@@ -12,8 +12,11 @@ from collections.abc import Callable
 from starlette.responses import Response
 from starlette.types import Scope
 
+from store.tokens import Tokens
+
 from ..settings import Settings
 from .admission import Load, refusal
+from .clients import client_of
 
 __all__ = ["DOOR", "Door"]
 
@@ -31,10 +34,12 @@ class Door:
         self,
         settings: Settings,
         load: Load,
+        tokens: Tokens,
         is_kept: Callable[[Scope], bool],
         record: Callable[[Scope, str, int, int, float], None],
     ) -> None:
-        self._settings, self._load, self._is_kept, self._record = settings, load, is_kept, record
+        self._settings, self._load, self._tokens = settings, load, tokens
+        self._is_kept, self._record = is_kept, record
 
     def refused(self, scope: Scope) -> Response | None:
         """Return the answer to a request that is turned away, None for one that may go on to the application.
@@ -49,7 +54,7 @@ class Door:
         if root and path.startswith(f"{root}/"):
             scope = {**scope, "path": path[len(root) :]}
         forwarded = any(name == b"x-forwarded-for" for name, _ in scope["headers"])
-        response = refusal(self._load, scope, is_known=not forwarded)
+        response = refusal(self._load, scope, None if forwarded else client_of(scope, self._tokens))
         if response is None or self._is_kept(scope):
             return None
         response.headers["X-Request-ID"] = scope["state"]["request_id"]

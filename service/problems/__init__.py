@@ -6,6 +6,7 @@ The type of a problem is `urn:wizen:problem:<code>`; clients branch on it and pe
 from __future__ import annotations
 
 import difflib
+import json
 import os
 import re
 from collections.abc import Iterable, Mapping
@@ -103,6 +104,11 @@ STATUS: Mapping[type[Exception], int] = {
     errors.EngineDied: 500,
 }
 
+#: What to do about what a solver refuses in its model's own words.
+_TAKES = "GET /v1/solvers/NAME says what each parameter takes."
+#: What is refused before any model sees it.
+_UNREADABLE = "Send JSON in UTF-8 that is not nested deeply, with Content-Type: application/json."
+
 #: In the order in which they are named to whoever takes another one.
 _METHODS = ("GET", "HEAD", "POST", "PUT", "PATCH", "DELETE")
 _RETRY = {429: "10", 503: "5"}
@@ -166,12 +172,15 @@ def told(error: Exception) -> dict[str, Any]:
 def of(error: Exception, scope: Scope) -> Response:
     """Return the problem for a known exception: a SolverError, a StoreError or a ServiceError."""
     status = next(STATUS[kind] for kind in type(error).__mro__ if kind in STATUS)
+    advice = str(getattr(error, "advice", ""))
+    if not advice and type(error) is contract.InvalidInput:  # a geometry that cannot be says so itself
+        advice = _TAKES
     return _response(
         scope,
         status,
         getattr(error, "code", "error"),
         str(getattr(error, "message", error)),
-        str(getattr(error, "advice", "")),
+        advice,
         [Culprit(**wrong._asdict()) for wrong in getattr(error, "wrong", ())],
         getattr(error, "headers", None),
         getattr(error, "more", {}),
@@ -246,6 +255,8 @@ async def _http(request: Request, error: Exception) -> Response:
         detail = f"{path} does not take {request.method}."
         advice = f"Use {allowed}."
         headers["Allow"] = allowed
+    elif status == 400:
+        advice = _UNREADABLE
     code = phrase.lower().replace(" ", "-").replace("'", "")
     return _response(request.scope, status, code, detail, advice, headers=headers)
 
@@ -280,8 +291,26 @@ def _response(
         errors=list(wrong),
         **(more or {}),
     )
-    body = problem.model_dump(exclude_defaults=True)
+    body = _encoded(problem.model_dump(exclude_defaults=True))
     extra = {"Cache-Control": "no-store", **(headers or {})}
     if status in _RETRY:
         extra.setdefault("Retry-After", _RETRY[status])
-    return Response(orjson.dumps(body), status, extra, MEDIA_TYPE)
+    return Response(body, status, extra, MEDIA_TYPE)
+
+
+def _encoded(body: dict[str, Any]) -> bytes:
+    """Return a problem as JSON. JSON that was sent may hold halves of characters, which no UTF-8 has: those are told as
+    they were written.
+    """
+    try:
+        return orjson.dumps(body)
+    except TypeError:
+        return json.dumps(_whole(body)).encode()
+
+
+def _whole(value: Any) -> Any:
+    if isinstance(value, str):
+        return value.encode("utf-8", "backslashreplace").decode()
+    if isinstance(value, Mapping):
+        return {_whole(name): _whole(entry) for name, entry in value.items()}
+    return [_whole(entry) for entry in value] if isinstance(value, list | tuple) else value

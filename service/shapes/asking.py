@@ -173,10 +173,13 @@ def beyond(found: Found, words: Words) -> list[Wrong]:
     near = found.fits[0]
     wrong = []
     for miss in (*near.misses, *near.unusual):
-        detail, advice = stored.describe(miss, near.info)
+        name = words.stage if miss.name == STAGE else miss.name
+        detail, advice = stored.describe(miss._replace(name=name), near.info)
+        if name in words.ranges:
+            advice = f"Take {name} from {words.say(name)}."  # with its units
         if found.preset is not None and miss.name in found.filled and miss.name not in found.said:
-            advice = f"That is of the preset {found.preset}: choose another, say {miss.name} yourself, or have it run."
-        wrong.append(Wrong(words.stage if miss.name == STAGE else miss.name, detail, advice))
+            advice = f"That is of the preset {found.preset}: choose another preset. {advice}"
+        wrong.append(Wrong(name, detail, advice))
     return wrong
 
 

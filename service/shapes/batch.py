@@ -27,7 +27,7 @@ from . import detail as level
 from .asking import Found, beyond, choose, preset_of, words_of
 from .batch_detail import Asked
 from .batch_formats import Batch
-from .batch_request import BatchRequest, expand
+from .batch_request import BatchRequest, counted, expand
 from .live import LiveTables
 from .query import RESERVED, ShapeQuery, Words, method_of, parse
 
@@ -60,13 +60,14 @@ def batch(request: Request, body: BatchRequest) -> Response:
     tables: LiveTables = request.app.state.tables
     solver = vocabulary.solver_named(body.solver)
     chosen = batch_formats.negotiate(request.headers.get("accept"), body.format)
+    # before anything is made of them: to choose a family takes its time for every shape
+    _check_count(counted(body.points), settings)
     entries = expand(body.points)
     found = _table(tables, solver, body, entries)
     name, table = found.name, tables.get(found.name)
     words = words_of(solver, table, settings.max_resolution, tables)
     detail = level.read(body.detail)
     # what is wrong with all of them is said first, and alone: it would hide what is wrong with some
-    _check_count(len(entries), settings)
     wrong = [*detail.refused(chosen), *_off(body, settings), *_unknown_method(body.method)]
     if wrong:
         raise InvalidQuery.of(wrong)

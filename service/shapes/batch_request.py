@@ -11,7 +11,7 @@ from ..errors import InvalidQuery, Wrong
 from . import detail
 from .query import LOWEST_RESOLUTION
 
-__all__ = ["BatchRequest", "expand"]
+__all__ = ["BatchRequest", "counted", "expand"]
 
 Number = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -71,6 +71,13 @@ class BatchRequest(BaseModel):
         return {k: ",".join(v) if isinstance(v, list) else str(v) for k, v in said.items() if v is not None}
 
 
+def counted(points: list[Row] | Columns) -> int:
+    """Return how many shapes are asked for; of columns that are not of one length, as many as the longest says."""
+    if isinstance(points, list):
+        return len(points)
+    return max((len(values) for values in points.values() if isinstance(values, list)), default=1)
+
+
 def expand(points: list[Row] | Columns) -> list[Mapping[str, float]]:
     """Return one mapping per shape.
 
@@ -81,7 +88,7 @@ def expand(points: list[Row] | Columns) -> list[Mapping[str, float]]:
     if isinstance(points, list):
         return list(points)
     lengths = {name: len(values) for name, values in points.items() if isinstance(values, list)}
-    count = max(lengths.values(), default=1)
+    count = counted(points)
     short = [name for name, length in lengths.items() if length != count]
     if short:
         advice = "Give every list as many values as there are shapes; a single number stands for all."

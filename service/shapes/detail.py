@@ -31,7 +31,7 @@ _FEWEST = 8
 #: Formats of numbers, which need no closed mesh.
 _PARTIAL = ("npz",)
 _FIELDS = ("position", "displacement")
-_NUMBER = r"(-?\d{1,4}(?:\.\d{0,9})?)"
+_NUMBER = r"(-?[0-9]{1,4}(?:\.[0-9]{0,9})?)"
 _REGION = re.compile(f"{_NUMBER}:{_NUMBER},{_NUMBER}:{_NUMBER}")
 
 
@@ -194,7 +194,7 @@ def _some(name: str, text: str | None, known: tuple[str, ...], wrong: list[Wrong
 
 def _positive(name: str, text: str, wrong: list[Wrong]) -> float | None:
     try:
-        number = float(text)
+        number = float(text) if text.isascii() and "_" not in text else math.nan
     except ValueError:
         number = math.nan
     if not 0 < number < math.inf:

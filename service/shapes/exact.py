@@ -15,14 +15,14 @@ from fastapi import Request
 from starlette.responses import Response
 
 from solver.contract import InvalidInput, Need, Params, SolverError, Start
-from store.errors import TooUncertain
+from store.errors import OutsideTable, TooUncertain
 from store.families.stored import document, refusal
 from store.starter import is_starter
 from store.surfaces.window import WHOLE
 from sweeps.relaxing import lattice_of
 
 from ..errors import InvalidQuery, OutsideRanges, Uncertain, Wrong
-from ..jobs.submit import asker_of, submit
+from ..jobs.submit import asker_of, check_begun, submit
 from ..security import authorize, bearer
 from ..settings import Settings
 from ..views.addresses import link
@@ -55,7 +55,8 @@ def offered(request: Request, asked: Asked, error: OutsideRanges | TooUncertain)
     if asked.found.fits:
         near = asked.found.fits[0]
         more["nearest"] = document(near)
-        if len(near.misses) + len(near.unusual) > _MANY:
+        missed = [miss.name for miss in (*near.misses, *near.unusual)]
+        if len(missed) > _MANY or not near.info.tied.keys().isdisjoint(missed):
             # refusals one by one would lead, together, to another fruit
             whole = refusal(asked.found.fits)
             message, advice = whole.message, f"{whole.advice} {offer}"
@@ -73,8 +74,12 @@ def _ways(request: Request, asked: Asked) -> tuple[dict[str, str], str]:
     """
     try:
         params, preset = _run(asked)
+    except OutsideTable as error:
+        return {}, f"No run is offered: {error}"
+    try:
         values = asked.solver.parse(params, preset)
         asked.solver.settle(_need(asked), preset, (values,))
+        check_begun(request.app.state.tables.store, values.model_dump(mode="json"))
     except InvalidInput as error:
         return {}, f"No run can be like that either: {error}"
     typed = _command(asked, values)
@@ -110,6 +115,7 @@ def redirect(request: Request, asked: Asked) -> Response:
         InvalidQuery: a part of it is asked for.
         Unauthorized, Forbidden: the request has no token for it.
         InvalidInput: the solver cannot compute it either.
+        OutsideTable: nobody knows what goes with an axis of the table there.
         TooCostly, QueueFull, ReadOnlyStore: as for any job.
 
     """
@@ -173,11 +179,22 @@ def _need(asked: Asked) -> Need:
 
 
 def _run(asked: Asked) -> tuple[Mapping[str, Any], str | None]:
-    """Return the parameters of the run of a question, and the preset that they go over."""
+    """Return the parameters of the run of a question, and the preset that they go over.
+
+    What follows an axis of the table goes with it, unless the asker meant no table.
+
+    Raises:
+        OutsideTable: nobody knows what goes with an axis there.
+
+    """
     query, table = asked.query, asked.table.info
-    if query.is_elsewhere:
-        return _said(asked), asked.found.preset
-    return {**table.template, **table.complete(query.point), **query.named}, None
+    if not query.is_elsewhere:
+        over = {**query.point, **table.following(query.point, query.named), **query.named}
+        return asked.solver.params.over(table.template, over), None
+    said = _said(asked)
+    if not asked.found.fits and asked.found.preset is None:
+        said |= table.following({name: query.point[name] for name in table.axes if name in said}, said)
+    return said, asked.found.preset
 
 
 def _command(asked: Asked, run: Params) -> _Command:

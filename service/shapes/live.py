@@ -6,6 +6,7 @@ Readers hold the `ShapeTable` that they were given until they are done; a swap o
 from __future__ import annotations
 
 import difflib
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -15,7 +16,7 @@ from pathlib import Path
 
 from solver import registry
 from solver.contract import Solver
-from store.errors import CorruptTable, StoreError, UnknownTable
+from store.errors import CorruptTable, UnknownTable
 from store.families.choose import Families
 from store.families.stored import families
 from store.generations.generation import Judged, judged
@@ -32,12 +33,21 @@ __all__ = ["LiveTables"]
 Stamp = tuple[int, int, int]
 
 
+#: Seconds after which a generation that could not be opened is tried again, twice as many after each failure up to the
+#: most: a copy may bring the manifest before the file that it names, and a disk may come back.
+_AGAIN, _SELDOM = 0.5, 60.0
+
+
 @dataclass
 class _Open:
+    """An open table: the manifest that was last looked at, what is wrong with its generation, and when to try again."""
+
     table: ShapeTable
     stamp: Stamp
     looked: float
     complaint: str = ""
+    failures: int = 0
+    again: float = math.inf
 
 
 class LiveTables:
@@ -226,19 +236,24 @@ class LiveTables:
             raise
         entry.looked = time.monotonic()
         if stamp != entry.stamp:
-            entry.stamp = stamp
-            threading.Thread(target=self._renew, args=(name, entry, stamp), daemon=True).start()
+            entry.failures = 0
+        elif entry.looked < entry.again:
+            return
+        entry.stamp, entry.again = stamp, math.inf
+        threading.Thread(target=self._renew, args=(name, entry, stamp), daemon=True).start()
 
     def _renew(self, name: str, entry: _Open, stamp: Stamp) -> None:
         try:
             table = self._read(name)
-        except (StoreError, OSError) as error:
+        except Exception as error:  # whatever it is, the old generation serves and the next try may go well
             if entry.stamp == stamp:
-                entry.complaint = str(error)
+                entry.complaint = str(error) or type(error).__name__
+                entry.again = time.monotonic() + min(_AGAIN * 2 ** min(entry.failures, 10), _SELDOM)
+                entry.failures += 1
             LOGGER.error("table %s: keeping the old generation: %s", name, error)
             return
         if entry.stamp == stamp:  # else a still newer one is on its way
-            entry.table, entry.complaint = table, ""
+            entry.table, entry.complaint, entry.failures = table, "", 0
             LOGGER.info("table %s: new generation %s", name, table.digest)
 
 

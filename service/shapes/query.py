@@ -47,7 +47,7 @@ LOWEST_RESOLUTION = 4
 _LIMIT = rf"(?:(?:{'|'.join(Measures._fields)}):)?[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?"
 LIMITS = rf"{_LIMIT}(?:,{_LIMIT})*"
 
-_RESOLUTION = re.compile(r"(\d{1,6})(?:[x×](\d{1,6}))?")
+_RESOLUTION = re.compile(r"([0-9]{1,6})(?:[x×]([0-9]{1,6}))?")
 
 #: Share of a range by which a number may lie outside: round-off of bounds that went through text.
 _SLACK = 1e-9
@@ -85,7 +85,7 @@ class Words(NamedTuple):
         """Return the range of an axis or of the stage with its units, in words."""
         low, high = self.ranges[name]
         units = self.units.get(name, "1")
-        return f"{low:g} to {high:g}" + ("" if units == "1" else f" [{units}]")
+        return f"{low:.15g} to {high:.15g}" + ("" if units == "1" else f" [{units}]")
 
 
 class ShapeQuery(NamedTuple):
@@ -177,7 +177,7 @@ def _together(
 ) -> list[Wrong]:
     """Return what is off the table, each once; what only a preset said is not the asker's to leave out."""
     advice = {} if preset is None else {w.name: _of_preset(preset) for w in outside if w.name not in said}
-    advice |= {w.name: w.advice for w in beyond if w.name not in said}
+    advice |= {w.name: w.advice for w in beyond}
     found = [w._replace(advice=advice.get(w.name, w.advice)) for w in outside]
     return [*found, *(w for w in beyond if w.name not in {w.name for w in found})]
 
@@ -191,7 +191,12 @@ def _other(name: str, text: str, held: str) -> list[Wrong]:
     if text == held:
         return []
     detail = f"this table holds {name} = {held!r} only, not {text[:40]!r}"
-    return [Wrong(name, detail, f"Leave {name} out, or choose another table.")]
+    return [Wrong(name, detail, _set(name, held))]
+
+
+def _set(name: str, held: str) -> str:
+    """Return how to have what a table holds; to leave a parameter out would bring a preset's value back."""
+    return f"{f'Set {name}={held}' if held else f'Leave {name} out'}, or choose another table."
 
 
 def _unknown(name: str, known: Sequence[str]) -> Wrong:
@@ -207,15 +212,17 @@ def _off(
     if name in words.tied:
         tie = words.tied[name]
         lead = numbers.get(tie.leader)
-        if lead is None or same(number, tie(lead), TIED):
+        held = None if lead is None else tie.beyond(lead)
+        # where nobody knows what goes with the leader, that is off its axis, and the asker's word counts
+        if lead is None or held is None or same(number, held, TIED):
             return []
-        detail = f"{number:g} is not what goes with {tie.leader} = {lead:g} in this table, {tie(lead):.4g}"
-        return [Wrong(name, detail, f"Leave {name} out, or choose another table.")]
+        detail = f"{number:g} is not what goes with {tie.leader} = {lead:g} in this table, {held:.4g}"
+        return [Wrong(name, detail, _set(name, f"{held:.6g}"))]
     if name in words.fixed:
         held = words.fixed[name]
         if math.isclose(number, held, rel_tol=_SLACK, abs_tol=1e-12):
             return []
-        return [Wrong(name, f"this table holds {name} = {held:g} only", f"Leave {name} out, or choose another table.")]
+        return [Wrong(name, f"this table holds {name} = {held:g} only", _set(name, f"{held:.15g}"))]
     low, high = ranges[name]
     slack = _SLACK * (high - low)
     if low - slack <= number <= high + slack:
@@ -231,14 +238,16 @@ def _repeated(items: Sequence[tuple[str, str]]) -> list[Wrong]:
 
 
 def number_of(text: str) -> float | None:
-    """Return the finite number that a text is, None if it is none: in plain digits, not as programs write them."""
+    """Return the finite number that a text is, None if it is none: in plain digits, not as programs write them. Of
+    nothing there is no negative.
+    """
     if "_" in text or not text.isascii():
         return None
     try:
         number = float(text)
     except ValueError:
         return None
-    return number if math.isfinite(number) else None
+    return number + 0.0 if math.isfinite(number) else None
 
 
 def _resolution(text: str, words: Words) -> int | Wrong:

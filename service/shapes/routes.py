@@ -141,7 +141,7 @@ def _answer(request: Request, asked: Asked) -> Response:
     tag = _tag(chosen, name, table.digest, query, resolution, *detail.key)
     headers = {
         "ETag": tag,
-        "Cache-Control": f"{'public' if settings.public_read else 'private'}, max-age={settings.cache_age}",
+        "Cache-Control": settings.kept(settings.cache_age),
         "Vary": "Accept",
         "Wizen-Tier": "table",
     }

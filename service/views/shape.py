@@ -70,7 +70,10 @@ class ShapePage(BaseModel):
     tier: str = Field(
         description="How it came about: looked up in a `table`, `relaxed` from there by its solver, or a `run`"
     )
-    nearest: float = Field(description="Distance to the nearest run; 1 is a whole range of a parameter")
+    nearest: float | None = Field(
+        description="Distance to the nearest run; 1 is a whole range of a parameter; null of a shape that was relaxed "
+        "from a table that is no longer there"
+    )
     inside: bool = Field(description="The runs surround the question")
     held: float | None = Field(
         description="Share of the wrinkles' height (rms) that a lattice as fine as this one holds at least; null where "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,7 @@ from ..generations import generation
 from ..manifest import TableInfo, directory, read_manifest
 from ..store import Store
 from .choose import Base, Families
-from .match import Fit, Miss, same
+from .match import STAGE, Fit, Miss, same
 
 __all__ = ["base", "check_version", "describe", "document", "families", "made", "refusal", "samples", "values"]
 
@@ -103,23 +103,44 @@ def made(info: TableInfo, solver: Solver) -> dict[str, Any]:
 def describe(miss: Miss, info: TableInfo) -> tuple[str, str]:
     """Return what is wrong with a parameter that a table does not hold, and what to change."""
     if miss.reach is not None:
-        span = f"{miss.reach[0]:g} to {miss.reach[1]:g}"
+        span = _span(miss.reach)
         return f"{_said(miss.asked, 9)} is off the table's {span}", f"Take {miss.name} from {span}."
     if miss.name in info.tied:
         lead = info.tied[miss.name].leader
         detail = f"goes with {lead} in this table: {_said(miss.held)} there, not {_said(miss.asked)}"
     else:
         detail = f"this table holds {miss.name} = {_said(miss.held)} only"
-    return detail, f"Leave {miss.name} out, or choose another table."
+    return detail, _changes([miss], info)
+
+
+def _instead(fit: Fit) -> str:
+    """Return what to say instead, all of it, so that a family that was not near enough holds the fruit."""
+    more = [f"Give {name} from {_span(fit.info.axes[name])}." for name in fit.missing]
+    return " ".join(["The nearest fruit that it holds:", _changes([*fit.misses, *fit.unusual], fit.info), *more])
+
+
+def _changes(misses: Sequence[Miss], info: TableInfo) -> str:
+    """Return what to say of parameters, so that a table holds them."""
+    values, out, stages = [], [], []
+    for miss in misses:
+        if miss.name == STAGE:
+            stages.append(f"Ask for the stage {_said(miss.held, 15)}.")
+        elif miss.held in ("", None) or isinstance(miss.held, Mapping):
+            out.append(miss.name)
+        else:
+            entries = miss.held if isinstance(miss.held, list | tuple) else (miss.held,)
+            # between samples a follower lies on a curve, and may be a little off it
+            written = (_said(entry, 6 if miss.name in info.tied else 15) for entry in entries)
+            values.append(f"{miss.name}={','.join(written)}")
+    told = [f"Set {', '.join(values)}."] if values else []
+    return " ".join([*told, *([f"Leave {', '.join(out)} out."] if out else []), *stages])
 
 
 def refusal(fits: Sequence[Fit]) -> OutsideTable:
     """Return the refusal of a question that no family holds; `fits` has the nearest first."""
     near = fits[0]
     said = [
-        f"{miss.name} = {_said(miss.asked, 9)} ("
-        + (f"holds {miss.reach[0]:g} to {miss.reach[1]:g}" if miss.reach else f"holds {_said(miss.held)}")
-        + ")"
+        f"{miss.name} = {_said(miss.asked, 9)} (holds {_span(miss.reach) if miss.reach else _said(miss.held)})"
         for miss in (*near.misses, *near.unusual)
     ]
     more = f" and {len(said) - 4} more" if len(said) > 4 else ""
@@ -127,7 +148,7 @@ def refusal(fits: Sequence[Fit]) -> OutsideTable:
     return OutsideTable(
         f"no table holds this; the nearest is {near.info.name!r}, {near.distance:.3g} away in "
         f"{', '.join(said[:4])}{more}.",
-        "Change these, run it, or take the nearest by its name." + (f" The next: {others}." if others else ""),
+        _instead(near) + (f" The next: {others}." if others else ""),
     )
 
 
@@ -141,6 +162,11 @@ def document(fit: Fit) -> dict[str, Any]:
             for miss in (*fit.misses, *fit.unusual)
         },
     }
+
+
+def _span(reach: tuple[float, float]) -> str:
+    # a bound that is rounded would be refused when it is typed
+    return f"{_said(reach[0], 15)} to {_said(reach[1], 15)}"
 
 
 def _said(value: Any, digits: int = 4) -> str:

@@ -17,6 +17,8 @@ __all__ = ["Tie", "find"]
 
 #: Samples and parameters on one line that are no accident, where no pair of values comes back.
 _FEWEST, _LINE = 4, 3
+#: Share of a range by which a number may lie outside, and two slopes of one straight line differ: round-off.
+_SLACK = 1e-9
 
 
 @dataclass(frozen=True)
@@ -45,10 +47,24 @@ class Tie:
         rise = high - low
         return low + t * (a + t * ((3 * rise - 2 * a - b) + t * (a + b - 2 * rise)))
 
+    def beyond(self, x: float) -> float | None:
+        """Return the follower's value where the leader's is `x`, past its ends too where that is no guess: of one that
+        is equal to its leader, or lies with it on a straight line through three values or more. None elsewhere there.
+        """
+        slack = _SLACK * (self.at[-1] - self.at[0])
+        if self.at[0] - slack <= x <= self.at[-1] + slack:
+            return self(x)
+        if self.at == self.values:
+            return x
+        _, slopes = self._slopes()
+        if len(slopes) < 2 or max(slopes) - min(slopes) > _SLACK * abs(slopes[0]):
+            return None
+        rise = (self.values[-1] - self.values[0]) / (self.at[-1] - self.at[0])
+        return self.values[0] + rise * (x - self.at[0])
+
     def _slope(self, j: int) -> float:
         """Return the slope at a node: the weighted harmonic mean of its two intervals', at an end a parabola's."""
-        steps = [b - a for a, b in pairwise(self.at)]
-        slopes = [(b - a) / step for (a, b), step in zip(pairwise(self.values), steps, strict=True)]
+        steps, slopes = self._slopes()
         if len(slopes) == 1:
             return slopes[0]
         if j in (0, len(steps)):
@@ -60,6 +76,11 @@ class Tie:
         before, after = steps[j - 1], steps[j]
         one, two = 2 * after + before, after + 2 * before
         return (one + two) / (one / slopes[j - 1] + two / slopes[j])
+
+    def _slopes(self) -> tuple[list[float], list[float]]:
+        """Return the lengths of the intervals, and the slope of each."""
+        steps = [b - a for a, b in pairwise(self.at)]
+        return steps, [(b - a) / step for (a, b), step in zip(pairwise(self.values), steps, strict=True)]
 
 
 def find(columns: Mapping[str, Sequence[float]]) -> dict[str, Tie]:

@@ -14,6 +14,7 @@ import numpy as np
 from solver.arrays import Array
 from solver.contract import Fresh
 from solver.lattice import lattice
+from solver.rounding import from_zero, towards_zero
 
 from ..blending.blend import Blend, Blender, complex_view
 from ..blending.methods import DEFAULT, Method, parse
@@ -237,6 +238,6 @@ def refuse(
             there = f"ask for a stage of the table ({' or '.join(f'{s:g}' for s in between)}), " if between else ""
             where = "" if inside else " The query lies outside the hull of the samples."
             raise TooUncertain(
-                f"the expected error {name} is {expected[name]:.3g}, above {most:g}.{where}",
+                f"the expected error {name} is {from_zero(expected[name])}, above {towards_zero(most)}.{where}",
                 f"Run exactly these parameters, {there}add samples near them, or allow a larger error.",
             )

@@ -183,6 +183,11 @@ def test_limits_say_their_names(built: Path) -> None:
         many = ask(client, points=[ROWS[0]] * 4, resolution=8)
         assert many.status_code == 413
         assert "WIZEN_MAX_BATCH" in many.json()["advice"]
+        # nothing is made of too many: not the family of each, which here no table holds, nor their table
+        for points in ([{"te": 0.5, "s": 0.1}] * 4, {"te": 0.5, "s": [0.1] * 4}):
+            for more in ({}, {"table": "nowhere"}):
+                many = ask(client, points=points, **more)
+                assert (many.status_code, many.json()["type"]) == (413, "urn:wizen:problem:batch-too-large")
         large = ask(client, resolution=32)
         assert large.status_code == 413
         assert "at most 0 shapes" in large.json()["advice"]

@@ -80,7 +80,7 @@ def test_who_named_a_preset_is_not_told_to_leave_out_its_numbers(client: httpx.C
     assert all("That is of the preset potato: choose another" in advice for advice in told.values())
     again = client.get(SHAPE, params={**said, "rs1": 0.35}).json()["errors"]
     (own,) = (wrong["advice"] for wrong in again if wrong["name"] == "rs1")
-    assert "Leave rs1 out" in own
+    assert own == "Set rs1=0.4."
 
 
 def test_how_a_run_was_done_may_be_named(client: httpx.Client) -> None:
@@ -142,7 +142,7 @@ def test_what_a_preset_says_is_not_the_askers_where_a_table_is_named(client: htt
     assert "Leave" not in problem["advice"]
     assert problem["advice"].count("That is of the preset potato: choose another preset, or another table.") == 1
     again = client.get(SHAPE, params={**said, "rs1": 0.35}).json()["errors"]
-    assert "Leave rs1 out" in next(wrong["advice"] for wrong in again if wrong["name"] == "rs1")
+    assert next(w["advice"] for w in again if w["name"] == "rs1") == "Set rs1=0.3, or choose another table."
 
 
 def test_what_names_there_are_is_said_where_they_work(client: httpx.Client) -> None:
@@ -156,10 +156,19 @@ def test_what_names_there_are_is_said_where_they_work(client: httpx.Client) -> N
     assert not known & {"mirrors", "hours", "preset", "format", "method", "table"}
 
 
-@pytest.mark.parametrize("text", ["0_0.035", "\uff10.\uff10\uff13"])
-def test_numbers_are_plain_digits(client: httpx.Client, text: str) -> None:
-    problem = checked(client.get(SHAPE, params={"te": text, "s": 0.2}), 422, "invalid-query")
-    assert problem["errors"][0]["name"] == "te"
+@pytest.mark.parametrize("text", ["0_0.035", "\uff10.\uff10\uff13", "\u0661"])
+@pytest.mark.parametrize("name", ["te", "resolution", "screen_px", "region", "max_error"])
+def test_numbers_are_plain_digits(client: httpx.Client, name: str, text: str) -> None:
+    text = "45:90,0:\u0661" if name == "region" else text
+    answer = client.get(SHAPE, params={"te": 0.035, "s": 0.2, "format": "npz", name: text})
+    assert checked(answer, 422, "invalid-query")["errors"][0]["name"] == name
+
+
+def test_nothing_has_no_sign(client: httpx.Client) -> None:
+    said = client.get(SHAPE, params={"te": 0.035, "s": "-0.0", "format": "json"})
+    assert str(said.json()["stage"]["value"]) == "0.0"
+    plain = client.get(SHAPE, params={"te": 0.035, "s": "-0.0", "format": "obj"})
+    assert "s0.obj" in plain.headers["content-disposition"]
 
 
 def test_all_radii_typed_in_are_that_fruit(client: httpx.Client) -> None:

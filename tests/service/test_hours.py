@@ -43,6 +43,22 @@ def test_what_has_no_stage_is_refused(
     checked(client.get(f"/v1/solvers/{solver}/stages", params=query), status, code)
 
 
+@pytest.mark.parametrize("hours", ["1e300", "-1", "soon", "", "nan", "1_0", "\u0661"])
+def test_stages_and_shapes_say_the_same_of_hours(client: httpx.Client, hours: str) -> None:
+    asked = {"hours": hours, "under": "kinetics:grape"}
+    one, other = (
+        client.get(address, params={**asked, **more}).json()
+        for address, more in (("/v1/solvers/dehydration/stages", {}), (SHAPE, POINT))
+    )
+    assert (one["status"], one["detail"].removeprefix("hours: ")) == (422, other["detail"].removeprefix("hours: "))
+    assert one["advice"].removesuffix(",48.").replace("24", "48").rstrip(".") == other["advice"].rstrip(".")
+
+
+def test_hours_are_written_as_numbers_are(client: httpx.Client) -> None:
+    asked = {"hours": "2.4e1,48", "preset": "raisin"}
+    assert client.get("/v1/solvers/dehydration/stages", params=asked).json()["hours"] == [24, 48]
+
+
 def test_a_shape_after_hours_is_the_shape_of_its_stage(client: httpx.Client) -> None:
     (stage,) = SOLVER.stages_after([48], {"kinetics": "grape"})
     after = client.get(SHAPE, params={**POINT, "hours": 48, "under": "kinetics:grape"})

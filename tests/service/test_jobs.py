@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import signal
@@ -15,10 +16,14 @@ import pytest
 from openapi_spec_validator import validate
 
 from service.app import create_app
+from service.jobs import views
 from service.settings import Settings
+from store import starter
+from store.ledger.jobs import JobSpec
 from store.ledger.queue import Queue
 from store.store import Store
 
+from ..store.conftest import fill
 from ._asking import ROOT, answers, checked, until
 from ._jobs import bearer, body, drain, events
 from .conftest import client_of, served
@@ -93,6 +98,23 @@ def test_what_cannot_be_is_refused_before_any_work(
     problem = checked(answer, status, code)
     assert problem["detail"]
     assert Queue(store.ledger).waiting() == []
+
+
+def test_a_run_that_starts_from_a_result_that_is_not_there_is_refused(queue_only: httpx.Client, store: Store) -> None:
+    need = {"stages": [0.1], "quality": "preview"}
+
+    def ask(key: str) -> httpx.Response:
+        params = {"pattern": {"key": key, "stage": 0.1}}
+        return queue_only.post("/v1/jobs", json={"solver": "dehydration", "params": params, "need": need})
+
+    problem = checked(ask("a" * 64), 422, "invalid-input")
+    assert "pattern.key: no result is stored under aaaa" in problem["detail"]
+    assert "Run that one first" in problem["advice"]
+    assert checked(ask("../../etc/passwd"), 422, "invalid-input")["advice"]
+    assert Queue(store.ledger).waiting() == []
+    (own,) = fill(store, te=[0.03], gamma=[10.0])
+    packed = next(iter(Store(starter.ROOT).keys()))
+    assert [ask(key).status_code for key in (own, packed)] == [202, 202]
 
 
 def test_a_failure_comes_with_advice_and_may_be_tried_again(store: Store, queue_only: httpx.Client, log: Path) -> None:
@@ -249,6 +271,53 @@ def test_streams_of_events_are_counted(store: Store) -> None:
                 return again.status_code == 200
 
         until(free)
+
+
+def test_tokens_that_are_made_up_are_one_listener(store: Store) -> None:
+    with client_of(store.root, jobs_workers=0, max_listeners_per_client=1) as client:
+        url = client.post("/v1/jobs", json=body(), headers=bearer(store)).headers["location"] + "/events"
+        with client.stream("GET", url, headers={"Authorization": "Bearer x"}) as one:
+            lines = one.iter_lines()
+            assert next(lines) == "retry: 1000"
+            with client.stream("GET", url, headers={"Authorization": "Bearer y"}) as two:
+                assert two.status_code == 429
+            with client.stream("GET", url, headers=bearer(store, "other")) as three:
+                assert three.status_code == 200
+
+
+def test_the_head_of_a_stream_ends(store: Store) -> None:
+    with client_of(store.root, jobs_workers=0, max_listeners=1) as client:
+        url = client.post("/v1/jobs", json=body(), headers=bearer(store)).headers["location"] + "/events"
+        for _ in range(3):
+            head = client.head(url, timeout=10)
+            assert (head.status_code, head.content) == (200, b"")
+            assert head.headers["content-type"].startswith("text/event-stream")
+        with client.stream("GET", url) as stream:
+            assert stream.status_code == 200
+
+
+def test_lists_read_a_mesh_once(store: Store, queue_only: httpx.Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As long as a page has room for: each was read again at every look, once there were many."""
+    long = {"mesh": {"points": list(range(3000))}}
+    many = [JobSpec(f"{i:064x}", "growth", "1", {**long, "seed": i}, {"stages": [0.1]}) for i in range(150)]
+    store.ledger.want(many)
+    read: list[str] = []
+    size = views._size
+    monkeypatch.setattr(views, "_size", lambda value, enough: read.append("") or size(value, enough))
+    first, second = (queue_only.get("/v1/jobs?limit=200").json()["jobs"] for _ in range(2))
+    assert (len(first), first) == (150, second)
+    assert {tuple(job["omitted"]) for job in first} == {("mesh",)}
+    once = len(read)
+    queue_only.get("/v1/jobs?limit=200")
+    assert 0 < once == len(read)
+    # those that nobody asked for lately are forgotten, and not all of them
+    (last, *_) = store.ledger.jobs()
+    kept = f"{views._FEW:064x}"
+    for i in range(views._FEW + 10):
+        for key in (f"{i:064x}", kept):
+            views._shortened(dataclasses.replace(last, key=key))
+    assert len(views._SHORT) == views._FEW > 200
+    assert kept in views._SHORT
 
 
 def test_jobs_of_stopped_sweeps_are_left_alone(store: Store, queue_only: httpx.Client) -> None:

@@ -12,6 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import Any
 
 import httpx
@@ -25,6 +26,7 @@ from service.limits.clients import address, client_of
 from service.limits.connections import GuardedProtocol
 from service.settings import Settings, page
 from service.shapes.turns import Turns
+from store.tokens import Tokens
 
 from ._asking import ROOT, checked, until
 from .conftest import client_of as service_over
@@ -133,29 +135,40 @@ def test_what_is_refused_after_all_is_no_work_done() -> None:
 
 
 @pytest.mark.parametrize(("status", "is_work"), [(200, True), (422, True), (503, False)])
-def test_an_answer_that_says_no_is_no_work_done(status: int, is_work: bool) -> None:
+def test_an_answer_that_says_no_is_no_work_done(tmp_path: Path, status: int, is_work: bool) -> None:
     async def says(scope: Any, receive: Any, send: Any) -> None:
         time.sleep(0.01)
         await send({"type": "http.response.start", "status": status, "headers": []})
         await send({"type": "http.response.body", "body": b""})
 
     load = Load(8, 1.0)
-    with listening(Admission(says, load)) as port:
+    with listening(Admission(says, load, Tokens(tmp_path))) as port:
         talk(port, b"GET /v1/shapes/x HTTP/1.0\r\n\r\n")
     assert load.under_way == 0
     assert (load.delay > 0.005) == is_work
 
 
-def test_clients_have_names() -> None:
+def test_clients_have_names(tmp_path: Path) -> None:
+    tokens = Tokens(tmp_path)
+
     def named(host: str, *headers: tuple[bytes, bytes]) -> str:
-        return client_of({"client": (host, 1), "headers": headers})
+        return client_of({"client": (host, 1), "headers": headers}, tokens)
 
     assert named("10.0.0.1") == "10.0.0.1" != named("10.0.0.2")
     assert named("2001:db8::1") == named("2001:db8::ffff") != named("2001:db8:0:1::1")
     assert address("::ffff:10.0.0.1") == "10.0.0.1"
-    one, two = ((b"authorization", b"Bearer " + word) for word in (b"one", b"two"))
+    secrets = [tokens.create(name, ["read"])[1] for name in ("one", "two")]
+    one, two = ((b"authorization", f"Bearer {secret}".encode()) for secret in secrets)
     assert named("10.0.0.1", one) == named("10.0.0.2", one) != named("10.0.0.1", two)
-    assert "one" not in named("10.0.0.1", one)
+    assert secrets[0] not in named("10.0.0.1", one)
+    # whoever makes tokens up is one client
+    for made_up in (b"Bearer x", b"Bearer y", b"Basic abc", b"", b"Bearer \xff", f"Basic {secrets[0]}".encode()):
+        assert named("10.0.0.1", (b"authorization", made_up)) == "10.0.0.1"
+    tokens.revoke("one")
+    assert named("10.0.0.1", one) == "10.0.0.1"
+    tokens.path.write_text("[{}]")
+    assert Tokens(tmp_path).path.is_file()
+    assert named("10.0.0.1", two) == "10.0.0.1"
 
 
 def test_an_overloaded_service_says_so_at_once(built: Any) -> None:

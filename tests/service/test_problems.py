@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import logging
 import threading
 import time
@@ -220,3 +221,22 @@ def test_strange_characters_stay_a_problem(faulty: httpx.Client) -> None:
     problem = checked(faulty.get("/v1/tables/%00%0a%ff"), 404, "unknown-table")
     assert "\n" not in problem["instance"]
     checked(faulty.get("/v1/shapes/dehydration?%ff=%00&te=\u0661"), 422, "invalid-query")
+
+
+def test_halves_of_characters_are_told_as_they_were_written(client: httpx.Client) -> None:
+    """JSON may hold them, and no UTF-8 does: the error was one inside the handler of errors."""
+    item = {"solver": "dehydration", "stage": 0.1, "parameters": {"\ud800": 1}}
+    scene = {"camera": {"position": [0, 0, 9]}, "items": [item]}
+    batch = {"solver": "dehydration", "points": [{"\ud800": 1}]}
+    headers = {"Content-Type": "application/json"}
+    for address, body in (("/v1/scenes?format=json", scene), ("/v1/shapes:batch", batch)):
+        answer = client.post(address, content=json.dumps(body), headers=headers)
+        assert answer.status_code == 422, answer.text
+        assert "\\ud800" in checked(answer, 422, answer.json()["type"].rpartition(":")[2])["detail"]
+
+
+@pytest.mark.parametrize("address", ["/v1/shapes:batch", "/v1/scenes"])
+@pytest.mark.parametrize("sent", [b"[" * 100_000, b'{"solver": "\xff"}'])
+def test_what_cannot_be_read_has_advice(client: httpx.Client, address: str, sent: bytes) -> None:
+    answer = client.post(address, content=sent, headers={"Content-Type": "application/json"})
+    assert "JSON" in checked(answer, 400, "bad-request")["advice"]

@@ -84,8 +84,11 @@ def test_what_is_looked_up_is_relaxed_once_and_says_so(
     assert np.corrcoef(*radii)[0, 1] > 0.8
     assert np.abs(radii[0] - radii[1]).max() > 1e-4
     said = [ask(client, headers, format="json", **how) for how in ({}, {"exact": "relax"})]
-    table, kept = (client.get(one.headers.get("location", one.url)).json()["descriptors"] for one in said)
-    assert {"buckle_count", *table} <= {*kept}
+    table, kept = (client.get(one.headers.get("location", one.url)).json() for one in said)
+    assert {"buckle_count", *table["descriptors"]} <= {*kept["descriptors"]}
+    assert (kept["tier"], kept["exact"], kept["expected_error"]) == ("relaxed", False, None)
+    assert kept["nearest"] == table["nearest"] > 0
+    assert [kept[name] for name in ("inside", "held", "weights")] == [table[n] for n in ("inside", "held", "weights")]
     numbers = client.get(f"{sent.headers['location']}/fields", params={"names": "residual,moved,converged"}).json()
     assert numbers["fields"]["residual"]["values"][0] <= 5e-3
     assert numbers["fields"]["converged"]["values"] == [1]
@@ -101,7 +104,9 @@ def test_what_cannot_be_relaxed_is_refused(client: httpx.Client, headers: dict[s
     checked(ask(client, headers, exact="relax", max_error="0.1"), 422, "invalid-query")
     checked(ask(client, headers, exact="soft"), 422, "invalid-query")
     # the fresh shape is in balance
-    assert ask(client, headers, exact="relax", s=0).headers["wizen-tier"] == "table"
+    fresh = ask(client, headers, exact="relax", s=0, format="json")
+    assert fresh.headers["wizen-tier"] == "table"
+    assert (fresh.json()["tier"], fresh.json()["exact"]) == ("table", True)
 
 
 def test_a_generation_that_is_gone_is_said(client: httpx.Client, house: Store, headers: dict[str, str]) -> None:

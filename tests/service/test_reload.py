@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import threading
+import time
 from pathlib import Path
 
 import httpx
 import pytest
 
+from service.shapes import live as module
 from service.shapes.live import LiveTables
 from solver import registry
 from solver.dehydration import SOLVER
 from store import tables
-from store.errors import UnknownTable
+from store.errors import CorruptTable, UnknownTable
+from store.lookup import ShapeTable
 from store.store import Store
 
 from ..store.conftest import fill
@@ -79,6 +82,44 @@ def test_the_old_generation_serves_while_the_new_one_is_damaged(own: Store) -> N
         until(lambda: "complaint" not in client.get("/healthz").json()["tables"]["default"])
 
 
+@pytest.mark.parametrize("error", [CorruptTable("it is damaged."), KeyError("shape"), MemoryError()])
+def test_a_generation_that_could_not_be_opened_is_tried_again(
+    own: Store, monkeypatch: pytest.MonkeyPatch, error: Exception
+) -> None:
+    """A copy brings the manifest first, and the file that it names after it: the same manifest, that is."""
+    monkeypatch.setattr(module, "_AGAIN", 0.02)
+    live = LiveTables(own.root, 0)
+    first = live.get("default")
+    tries = []
+
+    def read(name: str) -> ShapeTable:
+        tries.append(name)
+        if len(tries) < 3:
+            raise error
+        return ShapeTable.open(own, name, surfaces=registry.surface)
+
+    monkeypatch.setattr(live, "_read", read)
+    build(own, resolution=8)
+    until(lambda: live.get("default") is first and bool(live.complaint("default")))
+    until(lambda: live.get("default") is not first)
+    assert (len(tries), live.complaint("default")) == (3, "")
+    assert live.get("default").digest == tables.info(own).digest
+
+
+def test_what_goes_on_failing_is_tried_ever_more_seldom(own: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    live = LiveTables(own.root, 0)
+    live.get("default")
+    entry, stamp = live._open["default"], (0, 0, 0)
+    entry.stamp = stamp
+    monkeypatch.setattr(live, "_read", {}.__getitem__)
+    waits = []
+    for _ in range(2000):
+        live._renew("default", entry, stamp)
+        waits.append(round(entry.again - time.monotonic(), 1))
+    assert waits[:4] == [0.5, 1.0, 2.0, 4.0]
+    assert waits[-1] == max(waits) == 60.0
+
+
 def test_a_deleted_table_is_gone_and_may_come_back(own: Store) -> None:
     live = LiveTables(own.root, 0)
     assert live.get("default").size == 4
@@ -125,3 +166,22 @@ def test_twenty_generations_under_load(tmp_path: Path) -> None:
     assert found["swaps"] == 20
     assert found["failed"] == 0
     assert found["requests"] > 100
+
+
+def test_a_picture_has_the_tag_of_the_generation_that_it_is_of(own: Store) -> None:
+    old = tables.info(own).digest
+    with client_of(own.root, reload_interval=60) as client:
+        assert client.get(SHAPE, params=QUERY).status_code == 200
+        address = "/v1/maps/default/thumbnail.png"
+        before = client.get(address)
+        assert (old[:32] in before.headers["etag"], before.headers["cache-control"]) == (True, "public, max-age=86400")
+        build(own, resolution=8)
+        assert tables.info(own).digest != old
+        # the new one is not open yet
+        during = client.get(address)
+        assert (during.headers["etag"], during.content) == (before.headers["etag"], before.content)
+        assert during.headers["cache-control"] == "no-cache"  # its address names the new one
+        again = client.get(address, headers={"If-None-Match": before.headers["etag"]})
+        assert (again.status_code, again.headers["cache-control"]) == (304, "no-cache")
+    with client_of(own.root) as client:
+        assert tables.info(own).digest[:32] in client.get(address).headers["etag"]

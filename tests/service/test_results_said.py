@@ -12,10 +12,13 @@ import httpx
 import numpy as np
 import pytest
 
+from service.jobs import results
+from solver import registry
 from solver.contract import Need, Start
 from solver.dehydration import SOLVER
 from solver.lattice import lattice
 from store.ledger.jobs import JobSpec
+from store.lookup import ShapeTable
 from store.store import Store
 
 from ..store.conftest import answer, fill
@@ -51,6 +54,8 @@ def done(store: Store, params: dict[str, Any], preset: str | None = None, **need
     run = answer(values, settled)  # type: ignore[arg-type]
     fresh = SOLVER.fresh(values.model_dump(mode="json"))
     assert fresh is not None
+    if "start" in need:
+        run.attrs["path"] = "relaxed"
     run["position"] = run["displacement"] + fresh.points(*lattice(16)).astype("f4")
     store.ledger.want([spec], "test")
     store.ledger.done(store.ledger.claim("tester", 60, [spec.key]), store.put(spec.key, run), 1.0)
@@ -73,6 +78,39 @@ def test_what_is_relaxed_says_from_where(client: httpx.Client, house: Store) -> 
     start = Start(table="stone-radius", digest="d" * 64, method="lean+LL+env", lattice=64)
     page = client.get(done(house, ASKED, start=start), params={"format": "json"}).json()
     assert (page["table"], page["digest"], page["method"]) == ("stone-radius", "d" * 64, "lean+LL+env")
+    # nobody can look up any more how near a run lies
+    assert (page["tier"], page["exact"], page["nearest"]) == ("relaxed", False, None)
+
+
+def test_what_is_relaxed_says_what_its_table_says_of_it(client: httpx.Client, house: Store) -> None:
+    table = ShapeTable.open(house, "raisin", surfaces=registry.surface)
+    at = {"te": 0.014}
+    own = done(house, table.at_parameters(at), start=Start(table="raisin", digest=table.digest, method="idw"))
+    looked = table.at(at, 0.2, resolution=16, method="idw")
+    for said in (
+        client.get(own, params={"format": "json"}).json(),
+        parsed(client.get(own, params={"format": "glb"}).content)[0]["nodes"][0]["extras"],
+    ):
+        assert (said["tier"], said["exact"], said["nearest"]) == ("relaxed", False, looked.nearest)
+        assert (said["inside"], said["held"], said["expected_error"]) == (looked.inside, looked.held, None)
+    assert looked.nearest > 0
+    page = client.get(own, params={"format": "json"}).json()
+    assert page["weights"] == dict(looked.weights)
+
+
+def test_what_is_made_of_a_result_is_asked_for_again_after_an_upgrade(
+    client: httpx.Client, house: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = done(house, ASKED)
+
+    def tag(name: str) -> str:
+        return client.get(result, params={"format": name}).headers["etag"]
+
+    before = {name: tag(name) for name in ("netcdf", "json", "obj", "ply")}
+    monkeypatch.setattr(results, "__version__", "99")
+    assert [name for name, old in before.items() if tag(name) == old] == ["netcdf"]
+    held = {"If-None-Match": ", ".join(before.values())}
+    assert client.get(result, params={"format": "obj"}, headers=held).status_code == 200
 
 
 def test_numbers_of_a_run_have_their_units(client: httpx.Client, house: Store) -> None:

@@ -61,9 +61,15 @@ def test_tokens_that_cannot_be(tmp_path: Path) -> None:
     assert [token.name for token in tokens.all()] == ["one"]
     with pytest.raises(ReadOnlyStore):
         Tokens(STARTER).create("two", ["run"])
-    tokens.path.write_text("[{}]")
-    with pytest.raises(CorruptTokens):
-        Tokens(tmp_path).all()
+    (good,) = json.loads(tokens.path.read_text())
+    damage: list[Any] = [{"expires": when} for when in ("soon", float("nan"), 10**400)]
+    damage += [{"scopes": ["write"]}, {"scopes": 3}, {"id": None}, {"digest": "é"}, {"created": []}]
+    for entry in ({}, *({**good, **wrong} for wrong in damage)):
+        tokens.path.write_text(json.dumps([entry]))
+        with pytest.raises(CorruptTokens):
+            Tokens(tmp_path).all()
+    tokens.path.write_text(json.dumps([good]))
+    assert [token.name for token in Tokens(tmp_path).all()] == ["one"]
 
 
 def test_many_at_once_lose_no_token(tmp_path: Path) -> None:
@@ -113,6 +119,9 @@ def test_reading_can_be_closed(own: Store, client: httpx.Client) -> None:
         answer = closed.get(SHAPE, params=QUERY, headers=headers)
         assert answer.status_code == 200
         assert "private" in answer.headers["cache-control"]
+        for page in ("/v1/maps/default/thumbnail.png", "/v1/solvers/dehydration/presets/potato/portrait.png"):
+            assert closed.get(page, headers=headers).headers["cache-control"] == "private, max-age=86400"
+            checked(closed.get(page), 401, "unauthorized")
         for page in ("/", "/healthz", "/openapi.json", "/metrics"):
             assert closed.get(page).status_code == 200
         paths = closed.get("/openapi.json").json()["paths"]

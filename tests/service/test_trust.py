@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -144,6 +145,10 @@ def test_what_is_too_uncertain_is_refused_with_advice(client: httpx.Client) -> N
         problem = checked(ask(client, max_error=little), 422, "too-uncertain")
         assert f"the expected error {name} is" in problem["detail"]
         assert "exact=run" in problem["advice"]
+        # what is told can be typed
+        told = re.search(rf"the expected error {name} is (\S+), above", problem["detail"])
+        assert told is not None
+        assert ask(client, max_error=f"{name}:{told[1]}").status_code == 200
     assert ask(client, max_error=f"{1.1 * expected['rgh']:.6f}").status_code == 200
     checked(ask(client, max_error="rgh:9,W1:0"), 422, "too-uncertain")
     # whoever has the shape from a question without a limit is refused all the same

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from pathlib import Path
 from typing import Any
 
@@ -228,6 +229,47 @@ def test_parameters_that_go_together_are_one_axis() -> None:
     # equal ones lead in their order, and two that merely rise together in few samples are two axes
     assert ties.find({"rs1": [0.3, 0.4], "rs2": [0.3, 0.4]})["rs2"].leader == "rs1"
     assert ties.find({"te": [0.03, 0.04], "gamma": [10.0, 30.0]}) == {}
+
+
+def test_past_its_ends_a_follower_is_known_where_that_is_no_guess(families: Families) -> None:
+    r4 = [0.6, 0.7, 0.8, 0.9]
+    line = {"r3": [1 - x / 2 for x in r4], "r4": r4, "r6": [ellipse(x) for x in r4], "r8": r4}
+    tied = ties.find(line)
+    assert {name: tie.leader for name, tie in tied.items()} == dict.fromkeys(("r3", "r6", "r8"), "r4")
+    assert (tied["r8"].beyond(0.95), tied["r8"].beyond(0.1)) == (0.95, 0.1)
+    assert tied["r3"].beyond(0.5) == pytest.approx(0.75)
+    assert (tied["r6"].beyond(0.95), tied["r6"].beyond(0.59)) == (None, None)
+    assert tied["r6"].beyond(0.9 + 1e-12) == ellipse(0.9)
+    assert ties.find({"te": [0.1, 0.1, 0.2, 0.2], "gamma": [1, 1, 3, 3]})["te"].beyond(4) is None  # through two
+    info = dataclasses.replace(families.infos[0], tied=tied)
+    assert info.complete({"r4": 0.7})["r6"] == pytest.approx(ellipse(0.7))
+    with pytest.raises(OutsideTable, match=r"r4 = 0\.95 is not known: .* r6 follow it from 0\.6 to 0\.9"):
+        info.complete({"r4": 0.95})
+    assert info.following({"r4": 0.95}, ["r6"]) == pytest.approx({"r3": 0.525, "r8": 0.95})
+
+
+@pytest.mark.parametrize(
+    ("said", "stage", "preset"),
+    [
+        ({"te": 0.03}, 0.2, "raisin"),
+        ({"te": 0.03, "r4": 0.5, "rs1": 0.35}, 0.5, "raisin"),
+        ({"seed": 3, "mirrors": "xyz"}, 0.2, "raisin"),
+        ({"rs1": 0.31, "imperfection_kind": "mode", "imperfection": 1 / 3}, 0.2, None),
+        ({}, 0.2, "plum2"),
+        ({"te": 0.001, **RADII}, -0.1, None),
+    ],
+)
+def test_advice_that_is_followed_leads_to_the_nearest(
+    families: Families, said: dict[str, Any], stage: float, preset: str | None
+) -> None:
+    assert families.choose(said, stage, preset) is None
+    fits = families.nearest(said, stage, preset)
+    told = re.sub(r"\.(?= |$)", "", stored.refusal(fits).advice)
+    for pair in re.findall(r"(\w+)=([^ ,]+)", told):
+        said = {**said, pair[0]: pair[1] if pair[1].isalpha() else float(pair[1])}
+    for at in re.findall(r"the stage (\S+)", told):
+        stage = float(at)
+    assert chosen(families, said, preset, stage) == fits[0].info.name
 
 
 def test_a_table_of_spherical_stones_is_asked_by_one_radius(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
@@ -20,7 +21,7 @@ from store.starter import ROOT
 from store.surfaces import spectra
 from sweeps.outputs import of_result
 from sweeps.relaxing import begun as begun_at
-from sweeps.relaxing import lattice_of, relaxed
+from sweeps.relaxing import lattice_of, looked_up, relaxed
 
 POINT, STAGE = {"te": 0.034, "gamma": 22.0}, 0.2
 
@@ -66,6 +67,16 @@ def test_what_is_relaxed_starts_and_ends_as_in_a_job(resolution: int | None) -> 
     assert found.poles.tobytes() == job.poles.tobytes()
     assert found.crossings == job.crossings
     assert found.tier == job.tier == "relaxed"
+    assert (found.exact, job.exact) == (False, False)
+    assert math.isnan(job.nearest)
+    start = Start(table="default", digest=table.digest, method=shape.method)
+    said = looked_up(table, start, table.at_parameters(shape.parameters), STAGE, len(found.position))
+    assert replace(job, **said).trust() == found.trust()
+    assert said["weights"] == found.weights
+    # the fresh shape is in balance as it is
+    fresh = table.at(POINT, 0.0, resolution=resolution)
+    assert relaxed(replace(SOLVER, relax=relax), table, fresh) == (fresh, {})
+    assert (fresh.exact, fresh.tier, len(begun)) == (True, "table", 1)
     # the closed form of the waves, of which the rings' means are off by more than they could by rounding
     assert np.allclose(found.poles, [[0, 1.1, 0], [0, -1.1, 0]], atol=1e-4)
 

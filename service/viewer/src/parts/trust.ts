@@ -25,7 +25,7 @@ export function verdict(about: About): Verdict {
     const why = "Of the roughness, measured by leaving runs out of the table: how deep the wrinkles are, not where.";
     return { level, text: `expected error ${percent(error)}`, why };
   }
-  const level = about.nearest > 0.5 ? "poor" : "fair";
+  const level = (about.nearest ?? 0) > 0.5 ? "poor" : "fair";
   const text = level === "poor" ? "interpolated, far from any run" : "interpolated, near a run";
   return { level, text, why: "Between stored runs; 0 is on a run, 1 a whole range away from it." };
 }
@@ -49,7 +49,7 @@ export const tierOf = (about: About): string =>
   ({ table: `looked up, ${about.method}`, relaxed: "relaxed by the solver", run: "run by the solver" })[about.tier] ?? about.tier;
 
 export function showTrust(root: HTMLElement, about: About, speed: string): void {
-  const rows: [string, string | Node][] = [["Nearest run", digits(about.nearest)]];
+  const rows: [string, string | Node][] = about.nearest == null ? [] : [["Nearest run", digits(about.nearest)]];
   rows.push(["Between runs", about.inside ? "yes" : "no"]);
   for (const [name, [word, say]] of Object.entries(MEASURES)) {
     const value = about.expected_error?.[name];

@@ -49,7 +49,7 @@ export interface Described {
 export interface About {
   exact: boolean;
   converged: boolean;
-  nearest: number;
+  nearest: number | null;
   digest: string;
   stage: { symbol: string; value: number };
   weights: Record<string, number>;
