@@ -80,8 +80,8 @@ class _Quality:
 
 #: Shrinkages at which a path settles on its way. Where buckles come up the first decides their number (without the one
 #: at 0.05 stiff skins had a fifth more roughness at 0.1 and fewer buckles); later they may stand farther apart, which
-#: saves up to a third of the steps. They are the same at every quality, as they decide what fruit it is: from close ones
-#: that each settle to their end, more and shallower buckles of a higher energy are left in deep stages.
+#: saves up to a third of the steps. They are the same at every quality, as they decide what fruit it is: close ones that
+#: each settle to their end leave more and shallower buckles, of a higher energy, in deep stages.
 _RUNGS = tuple(round(0.05 * k, 2) for k in range(1, 13))
 _WIDE = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 #: Skins and moduli for which rungs stand apart: others were not tried so.
@@ -132,9 +132,9 @@ _THIN, _THINNER = 0.02, 4.0
 #: the skin gives way by, and its rest volumes would follow for ever.
 _STIFFER = 2.0
 #: Wall seconds per element and step on one core, for estimates only.
-_SECONDS_PER_ELEMENT_STEP = 5e-8
+_SECONDS_PER_ELEMENT_STEP = 6e-8
 #: Steps that a stage settles for, by and large (at the same reference), for estimates only.
-_SETTLING_STEPS = 3000
+_SETTLING_STEPS = 4000
 #: Steps after which most looked-up shapes are in balance, for estimates only.
 _RELAXING_STEPS = 1500
 #: Seconds until compiled kernels are loaded and the mesh is made.

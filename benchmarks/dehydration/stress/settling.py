@@ -3,8 +3,8 @@
 Eighths of four stages: steps of the whole run, roughness, how far volumes are from a sphere's, and what a stage is left
 with, as things are and with one thing changed: rungs that do not stand apart, swings where it would be eased, rest
 volumes that stay in a swing, or that go all of the way to those of the pressures, the march at another kappa/mu, with
-steps as long as it allows, layers of flesh as thin as fine's. Then thick and stiff skins at preview, to where they blow up. Kept as dehydration-settling;
-runs that are in the record already, of this version, are not run again.
+steps as long as it allows, layers of flesh as thin as fine's. Then thick and stiff skins at preview, to where they blow
+up. Kept as dehydration-settling; runs that are in the record already, of this version, are not run again.
 """
 
 from __future__ import annotations
