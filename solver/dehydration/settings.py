@@ -80,8 +80,8 @@ class _Quality:
 
 #: Shrinkages at which a path settles on its way. Where buckles come up the first decides their number (without the one
 #: at 0.05 stiff skins had a fifth more roughness at 0.1 and fewer buckles); later they may stand farther apart, which
-#: saves up to a third of the steps. They are the same at every quality, as they decide what fruit it is: close ones that
-#: each settle to their end leave more and shallower buckles, of a higher energy, in deep stages.
+#: saves up to a third of the steps. They are the same at every quality, as they decide what fruit it is: close ones
+#: that each settle to their end leave more and shallower buckles, of a higher energy, in deep stages.
 _RUNGS = tuple(round(0.05 * k, 2) for k in range(1, 13))
 _WIDE = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 #: Skins and moduli for which rungs stand apart: others were not tried so.
