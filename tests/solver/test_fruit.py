@@ -10,7 +10,7 @@ from solver.fruit import PRESETS, Fruit, azimuths, colatitudes, directions, latt
 
 def fruit(name: str, **changes: object) -> Fruit:
     values = {k: v for k, v in PRESETS[name].items() if k != "modulus_ratio"}
-    return Fruit.parse({**values, **changes})
+    return Fruit.parse(Fruit.over(values, changes))
 
 
 def test_sphere_is_exact():
