@@ -133,8 +133,9 @@ _THIN, _THINNER = 0.02, 4.0
 _STIFFER = 2.0
 #: Wall seconds per element and step on one core, for estimates only.
 _SECONDS_PER_ELEMENT_STEP = 6e-8
-#: Steps that a stage settles for, by and large (at the same reference), for estimates only.
-_SETTLING_STEPS = 4000
+#: Steps that a stage settles for, by and large (at the same reference), for estimates only. Those of fine go on until
+#: they drift half as fast.
+_SETTLING_STEPS = {"preview": 3000, "default": 3000, "fine": 8000}
 #: Steps after which most looked-up shapes are in balance, for estimates only.
 _RELAXING_STEPS = 1500
 #: Seconds until compiled kernels are loaded and the mesh is made.
@@ -238,7 +239,7 @@ def expected_cost(params: DehydrationParams, need: Need) -> Cost:
         return _whole_cost(settings, _RELAXING_STEPS)
     rungs = [rung for rung in settings.rungs if settings.start < rung < last + 1e-9]
     states = len(rungs) + sum(all(abs(stage - rung) > 1e-9 for rung in rungs) for stage in need.stages)
-    settling = _SETTLING_STEPS * settings.n / _STEPS_N * states
+    settling = _SETTLING_STEPS[need.quality] * settings.n / _STEPS_N * states
     steps = max(last - settings.start, 0.0) / settings.pace + settling
     return _whole_cost(settings, steps)
 
