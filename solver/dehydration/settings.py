@@ -89,8 +89,7 @@ _WIDE_SKINS, _WIDE_MODULI = (0.0075, 0.04), (5.0, 50.0)
 
 #: Under deep folds core layers with one point each turn inside out: those within half a wavelength of the skin at
 #: gamma = 10 (s = 0.25), within two thirds at gamma = 50 (s = 0.3). Below, J stays above 0.6; one point there changes
-#: the roughness by less than another seed does. Nor do layers do more that grow faster than fine's, which are two of
-#: seven to ten fewer (record dehydration-settling).
+#: the roughness by less than another seed does, and so do layers that grow faster than fine's.
 _QUALITIES = {
     "preview": _Quality(4.2, 18, 48, 2e-3, 2e-2, 0.12, 1.7, 3),
     "default": _Quality(6.0, 24, 96, 1e-3, 1e-2, 0.08, 1.6, 4),
