@@ -271,6 +271,7 @@ def _beyond(name: str, table: ShapeTable) -> str:
 
 
 def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path | None) -> None:
+    from solver.rounding import from_zero
     from store.surfaces import measures
 
     last = shapes[-1]
@@ -284,7 +285,7 @@ def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path |
     if len(errors) == len(shapes):
         rows += [
             [f"expected error of {measures.OF[key]} ({key})", measures.UNITS[key]]
-            + [f"{said[key]:.3g}" for said in errors]
+            + [from_zero(said[key]) for said in errors]
             for key in errors[0]
         ]
     rows += [["a stored run, as it is", "", *("yes" if shape.exact else "no" for shape in shapes)]]

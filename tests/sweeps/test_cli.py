@@ -175,8 +175,7 @@ def test_parameters_of_a_file_give_way_to_what_is_set_by_whatever_name(shrinking
     assert (found["exocarp_thickness"], found["modulus_ratio"], found["seed"]) == (0.05, 20.0, 8)
     file.write_text("te = 0.03\nexocarp_thickness = 0.02\n")
     refused = wizen(*asked)
-    assert refused.exit_code == 2
-    assert "given twice" in document(refused)["error"]["message"]
+    assert (refused.exit_code, "given twice" in document(refused)["error"]["message"]) == (2, True)
 
 
 EIGHTH = ("solve", "dehydration", "--set", "te=0.1", "--set", "mirrors=xyz", "--quality", "preview", "--resolution", 8)
