@@ -90,11 +90,22 @@ class Service:
             Refused: no answer, or what the service has against the question.
 
         """
-        query = {"table": table, **{name: repr(float(v)) for name, v in values.items()}, "resolution": n}
-        text = urllib.parse.urlencode({**query, "format": "points"})
+        text = _query(table, values, resolution=n, format="points")
         return points(self.ask(f"/v1/shapes/{urllib.parse.quote(solver)}?{text}"))
 
-    def submit(self, solver: str, preset: str, params: Mapping[str, Any], stages: list[float], quality: str) -> str:
+    def parameters(self, solver: str, table: str, values: Mapping[str, float]) -> dict[str, Any]:
+        """Return all that a run needs to be told to be the fruit of a table: what the table holds fixed, what follows
+        its axes, and the words of its runs. What they were begun from is in the store that they were made in.
+
+        Raises:
+            Refused: no answer, or what the service has against the question.
+
+        """
+        about = self._json(f"/v1/shapes/{urllib.parse.quote(solver)}/info?{_query(table, values)}")
+        words = {name: value for name, value in about.get("made", {}).items() if isinstance(value, str)}
+        return {**about["params"], **words}
+
+    def submit(self, solver: str, params: Mapping[str, Any], stages: list[float], quality: str) -> str:
         """Begin a job and return its address.
 
         Raises:
@@ -102,8 +113,6 @@ class Service:
 
         """
         body: dict[str, Any] = {"solver": solver, "params": dict(params), "need": {"quality": quality}}
-        if preset:
-            body["preset"] = preset
         if stages:
             body["need"]["stages"] = stages
         address: str = self._json("/v1/jobs", body)["links"]["self"]
@@ -165,6 +174,10 @@ class Service:
         except (OSError, ValueError) as error:
             why = getattr(error, "reason", error)
             raise Refused(f"Nobody answers at {self._address} ({why}): start `wizen serve`.") from None
+
+
+def _query(table: str, values: Mapping[str, float], **more: Any) -> str:
+    return urllib.parse.urlencode({"table": table, **{name: repr(float(v)) for name, v in values.items()}, **more})
 
 
 def _said(error: urllib.error.HTTPError) -> str:

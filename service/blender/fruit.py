@@ -12,7 +12,7 @@ from .client import Points, Refused
 from .lattice import triangles, upright
 from .state import STATE
 
-__all__ = ["ask", "follow", "insert", "is_fruit", "sliders"]
+__all__ = ["ask", "dress", "follow", "insert", "is_fruit", "sliders", "values"]
 
 #: Names of what an object remembers besides its sliders.
 _SOLVER, _TABLE, _AXES, _STAGE, _N = "wizen_solver", "wizen_table", "wizen_axes", "wizen_stage", "wizen_n"
@@ -28,6 +28,20 @@ def is_fruit(thing: Any) -> bool:
 def sliders(thing: Any) -> list[str]:
     """Return the names of a fruit's sliders, the stage last."""
     return [*filter(None, str(thing[_AXES]).split(",")), str(thing[_STAGE])]
+
+
+def values(thing: Any) -> dict[str, float]:
+    """Return what a fruit's sliders say, the stage last."""
+    return {axis: float(thing[axis]) for axis in sliders(thing)}
+
+
+def dress(thing: Any, name: str, scale: tuple[float, ...]) -> None:
+    """Make a run's object as large as the fruit that it was asked for, and give it the skin of that, if it is there."""
+    thing.scale = scale
+    fruit = bpy.data.objects.get(name)
+    if is_fruit(fruit):
+        for material in fruit.data.materials:
+            thing.data.materials.append(material)
 
 
 def insert(name: str, n: int = 64) -> Any:
@@ -69,9 +83,9 @@ def insert(name: str, n: int = 64) -> Any:
 def ask(thing: Any) -> None:
     """Ask for the shape that a fruit's sliders say."""
     solver, table, n, name = thing[_SOLVER], thing[_TABLE], int(thing[_N]), thing.name
-    values = {axis: float(thing[axis]) for axis in sliders(thing)}
-    STATE.asked[name] = (n, *values.values())
-    STATE.begin(("shape", name), lambda service: service.shape(solver, table, values, n), lambda p: _take(name, p))
+    said = values(thing)
+    STATE.asked[name] = (n, *said.values())
+    STATE.begin(("shape", name), lambda service: service.shape(solver, table, said, n), lambda p: _take(name, p))
 
 
 def follow() -> int:
@@ -80,7 +94,7 @@ def follow() -> int:
     for thing in bpy.data.objects:
         if is_fruit(thing):
             count += 1
-            said = (int(thing[_N]), *(float(thing[axis]) for axis in sliders(thing)))
+            said = (int(thing[_N]), *values(thing).values())
             if STATE.asked.get(thing.name) != said:
                 ask(thing)
     return count

@@ -66,17 +66,15 @@ class Run(bpy.types.Operator):
     def execute(self, context: Any) -> set[str]:
         """Submit."""
         thing = context.object
-        family = STATE.family(thing["wizen_table"]) if STATE.maps else {"presets": [], "solver": thing["wizen_solver"]}
-        preset = family["presets"][0] if family["presets"] else ""
-        *axes, stage = fruit.sliders(thing)
-        last, name, quality = float(thing[stage]), thing.name, self.quality
-        params = {axis: float(thing[axis]) for axis in axes}
+        solver, table, values = thing["wizen_solver"], thing["wizen_table"], fruit.values(thing)
+        last, name, quality = list(values.values())[-1], thing.name, self.quality
         stages = [round(last * (k + 1) / self.stages, 6) for k in range(self.stages)]
-        solver = thing["wizen_solver"]
+        job = {"name": name, "state": "queued", "fraction": 0.0, "scale": tuple(thing.scale)}
         STATE.begin(
             ("run", name),
-            lambda service: service.submit(solver, preset, params, stages, quality),
-            lambda address: STATE.jobs.update({address: {"name": name, "state": "queued", "fraction": 0.0}}),
+            # what the sliders leave open is the family's
+            lambda service: service.submit(solver, service.parameters(solver, table, values), stages, quality),
+            lambda address: STATE.jobs.update({address: job}),
         )
         return {"FINISHED"}
 
@@ -102,8 +100,8 @@ class Fetch(bpy.types.Operator):
 
     def execute(self, context: Any) -> set[str]:
         """Begin."""
-        address, name = self.address, STATE.jobs.get(self.address, {}).get("name", "run")
-        STATE.begin(("fetch", address), lambda service: _result(service, address), lambda found: _arrived(name, *found))
+        address, job = self.address, STATE.jobs.get(self.address, {"name": "run"})
+        STATE.begin(("fetch", address), lambda service: _result(service, address), lambda found: _arrived(job, *found))
         return {"FINISHED"}
 
 
@@ -154,9 +152,11 @@ def _result(service: Service, address: str) -> tuple[str, caches.Cache]:
     return service.result(address, "obj").decode(), caches.read(service.result(address, "pc2"))
 
 
-def _arrived(name: str, text: str, cache: caches.Cache) -> None:
+def _arrived(job: dict[str, Any], text: str, cache: caches.Cache) -> None:
+    name = job["name"]
     try:
         thing = loading.mesh_of(f"{name} run", text)
+        fruit.dress(thing, name, job.get("scale", (1.0, 1.0, 1.0)))
         loading.keyed(thing, cache)
         STATE.said = f"{name}: {len(cache.frames)} stages as shape keys"
     except Refused as error:

@@ -131,14 +131,14 @@ def export(asked: _Asked) -> None:
         "bytes": len(data),
         "vertices": sequence.samples if bound is None else len(sequence) * len(bound.points),
         "stages": list(sequence.stages),
-        "length": sequence.length,
+        "length": sequence.length if bound is None else f"the unit of {asked.mesh.name}",
     }
     if bound is not None:
         document["mesh"] = bound.report()
         _warn(bound)
 
     def show(console: Any) -> None:
-        console.print(f"{_size(len(data), len(sequence))}, lengths in {sequence.length}", markup=False)
+        console.print(f"{_size(len(data), len(sequence))}, lengths in {document['length']}", markup=False)
         for name, value in document.get("mesh", {}).items():
             console.print(f"{name} {value:.3g}", markup=False)
         console.print(f"written to {out}", markup=False)

@@ -91,8 +91,10 @@ def _toml(file: Path) -> dict[str, Any]:
 
     try:
         return tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InvalidOption(f"{file} cannot be read: {error}.", "Name a file that is there.") from None
+    except OSError as error:
+        raise InvalidOption(f"{file} cannot be read: {error.strerror}.", "Name a file that is there.") from None
+    except UnicodeDecodeError:
+        raise InvalidOption(f"{file} is not text in UTF-8.", "docs/scenes.md explains scene files.") from None
     except tomllib.TOMLDecodeError as error:
         raise InvalidOption(f"{file} is not TOML: {error}.", "docs/scenes.md explains scene files.") from None
 

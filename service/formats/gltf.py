@@ -11,12 +11,14 @@ import numpy as np
 from solver.arrays import Array
 from solver.contract import Worn
 
-__all__ = ["FLOAT", "INDICES", "UINT", "USHORT", "VERTICES", "Buffer", "bounds", "material", "pack", "skin"]
+__all__ = ["CLAY", "FLOAT", "INDICES", "UINT", "USHORT", "VERTICES", "Buffer", "bounds", "material", "pack", "skin"]
 
 _MAGIC, _JSON, _BIN = 0x46546C67, 0x4E4F534A, 0x004E4942
 FLOAT, USHORT, UINT = 5126, 5123, 5125
 VERTICES, INDICES = 34962, 34963
 
+#: What is no fruit and wears no skin.
+CLAY = Worn(np.array([0.479, 0.423, 0.361]), np.array([0.479, 0.423, 0.361]), 0.6, 0.0, np.zeros(3))
 _JUJUBE = Worn(np.array([0.45, 0.09, 0.06]), np.array([0.45, 0.09, 0.06]), 0.6, 0.0, np.zeros(3))
 
 

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.arrays import Singles, Words32
+from solver.arrays import Array, Singles, Words32
 from store.surfaces.drawn import normals
 
 if TYPE_CHECKING:
     from store.shape import Shape
 
-__all__ = ["normals", "seam", "seam_triangles", "surface", "texture", "triangles", "vertices"]
+__all__ = ["is_open", "normals", "seam", "seam_triangles", "surface", "texture", "triangles", "vertices"]
 
 
 def _frozen(array: Words32) -> Words32:
@@ -94,3 +94,15 @@ def surface(shape: Shape) -> tuple[NDArray[np.floating], NDArray[np.floating]]:
 def vertices(lattice: NDArray[np.floating], poles: NDArray[np.floating]) -> Singles:
     """Return a lattice field (n, 2n, 3) and its values (2, 3) at the poles as one array (2n^2 + 2, 3)."""
     return np.concatenate([lattice.reshape(-1, 3), poles], dtype=np.float32)
+
+
+def is_open(points: Array, triangles: Array) -> bool:
+    """Return whether a mesh (v, 3), (f, 3) of any kind has a rim, so that its inner side may be seen.
+
+    Seams split vertices, and leave them where they are: what counts is the place.
+    """
+    corners = np.unique(points, axis=0, return_inverse=True)[1].ravel()[triangles].astype(np.int64)
+    edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
+    low, high = edges[edges[:, 0] != edges[:, 1]].T
+    _, counts = np.unique(low * len(points) + high, return_counts=True)
+    return bool((counts % 2 == 1).any())

@@ -88,16 +88,17 @@ class _File:
         return at
 
     def pack(self, document: Json) -> bytes:
-        """Return the file."""
+        """Return the file; where nothing is in the picture it has no binary part, which glTF wants left out."""
         buffers: list[Json] = [{"byteLength": self.length}]
         if self._encoder is not None:
             buffers.append({"byteLength": self.plain, "extensions": {_MESHOPT: {"fallback": True}}})
-        document = {**document, "accessors": self.accessors, "bufferViews": self.views, "buffers": buffers}
+        if self.length:
+            document = {**document, "accessors": self.accessors, "bufferViews": self.views, "buffers": buffers}
         text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
         text += b" " * (-len(text) % 4)
-        head = struct.pack("<III", 0x46546C67, 2, 20 + len(text) + 8 + self.length)
-        chunk = struct.pack("<II", len(text), 0x4E4F534A)
-        return b"".join([head, chunk, text, struct.pack("<II", self.length, 0x004E4942), *self.parts])
+        binary = [struct.pack("<II", self.length, 0x004E4942), *self.parts] if self.length else []
+        head = struct.pack("<III", 0x46546C67, 2, 20 + len(text) + sum(map(len, binary)))
+        return b"".join([head, struct.pack("<II", len(text), 0x4E4F534A), text, *binary])
 
 
 def encode(
@@ -131,7 +132,7 @@ def encode(
     nodes += [props.node(file, meshes, materials, prop) for prop in held]
     used = {_INSTANCING} if still else set()
     used |= {_QUANTIZED} if len(n) else set()
-    required = sorted(used | ({_MESHOPT} if compress and compressor() is not None else set()))
+    required = sorted(used | ({_MESHOPT} if file.length and compress and compressor() is not None else set()))
     more = {name for material in materials for name in material.get("extensions", {})}
     document: Json = {
         "asset": {"version": "2.0", "generator": GENERATOR},
@@ -172,9 +173,13 @@ def _meshes(
         # with these, whoever has the file can put other stages of the kind in the place of this one
         extras: Json = {"etag": tag, "kind": kind.label, **kind.extras(size)}
         meshes.append({"name": f"{kind.label} {size}", "extras": extras})
+        fading = kind.curve[1:]
+        if fading:
+            extras["targetNames"] = [f"{stage:g}" for _, stage in fading]
+            meshes[-1]["weights"] = [0.0] * len(fading)
         if tag in known:
             extras["known"] = True
-            meshes[-1]["primitives"] = [_stub(file, material)]
+            meshes[-1]["primitives"] = [_stub(file, material, len(fading))]
             continue
         first, *later = kind.packed(size)
         if (kind.topology, size) not in indices:
@@ -182,7 +187,6 @@ def _meshes(
         primitive = _primitive(file, first, indices[kind.topology, size], material)
         meshes[-1]["primitives"] = [primitive]
         if later:
-            meshes[-1]["weights"] = [0.0] * len(later)
             primitive["targets"] = moving.target_views(file, first, later, kind.fades)
     return meshes, materials, made
 
@@ -207,8 +211,8 @@ def _primitive(file: _File, packed: Packed, indices: int, material: int) -> Json
     return {"attributes": attributes, "indices": indices, "material": material}
 
 
-def _stub(file: _File, material: int) -> Json:
-    """Return what stands for a mesh that the asker has: a triangle without extent."""
+def _stub(file: _File, material: int, later: int) -> Json:
+    """Return what stands for a mesh that the asker has: a triangle without extent, with targets for its weights."""
     empty = moving.known_vertices(VERTEX)
     at = VERTEX.fields
     assert at is not None
@@ -218,7 +222,8 @@ def _stub(file: _File, material: int) -> Json:
         "POSITION": file.accessor(view, _SHORT, "VEC3", 3, at["position"][1], min=[0] * 3, max=[0] * 3),
         "NORMAL": file.accessor(view, _BYTE, "VEC3", 3, at["normal"][1], normalized=True),
     }
-    return {"attributes": attributes, "material": material}
+    fading = {"targets": [{"POSITION": attributes["POSITION"]}] * later} if later else {}
+    return {"attributes": attributes, "material": material, **fading}
 
 
 def _instances(

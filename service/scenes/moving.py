@@ -53,8 +53,10 @@ def target_views(file: _File, base: Packed, later: list[Packed], fades: bool) ->
         steps = np.zeros(len(base.vertices), _FADING if fades else _TARGET)
         gone = one.vertices["position"].astype(int) - base.vertices["position"]
         turned = one.vertices["normal"].astype(int) - base.vertices["normal"]
+        # normalised bytes end at 1, and a normal that turns over goes 2: of such a target they are floats, apart
+        far = bool(np.abs(turned).max() > 127)
         steps["position"] = np.clip(gone, -32767, 32767)
-        steps["normal"] = np.clip(turned, -127, 127)
+        steps["normal"] = 0 if far else turned
         if fades:
             changed = one.vertices["colour"].astype(float) - base.vertices["colour"]
             steps["colour"] = np.round(changed * (127 / 255))
@@ -63,12 +65,21 @@ def target_views(file: _File, base: Packed, later: list[Packed], fades: bool) ->
         found.append(
             {
                 "POSITION": file.accessor(view, _SHORT, "VEC3", len(steps), 0, min=low, max=high),
-                "NORMAL": file.accessor(view, _BYTE, "VEC3", len(steps), 8, normalized=True),
+                "NORMAL": _whole(file, turned[:, :3]) if far else _bytes(file, view, len(steps)),
             }
         )
         if fades:
             found[-1]["COLOR_0"] = file.accessor(view, _BYTE, "VEC4", len(steps), 12, normalized=True)
     return found
+
+
+def _bytes(file: _File, view: int, count: int) -> int:
+    return file.accessor(view, _BYTE, "VEC3", count, 8, normalized=True)
+
+
+def _whole(file: _File, turned: Array) -> int:
+    view = file.view((turned / 127).astype("<f4"), "ATTRIBUTES", 34962)
+    return file.accessor(view, _FLOAT, "VEC3", len(turned))
 
 
 def weights(file: _File, nodes: list[tuple[int, Kind]]) -> list[dict[str, Any]]:

@@ -15,9 +15,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sweeps.pictures.colours import looks
+
 from ..errors import UnfitFormat
 from ..formats.about import GENERATOR
-from ..formats.gltf import FLOAT, INDICES, UINT, USHORT, VERTICES, Buffer, bounds, pack, skin
+from ..formats.gltf import CLAY, FLOAT, INDICES, UINT, USHORT, VERTICES, Buffer, bounds, pack, skin
 from .options import Options
 from .skins import looked, matter
 from .standing import Extra, cards, stems
@@ -67,6 +69,7 @@ class _File:
         self.rough: dict[float, int] = {}
         self.extra: dict[str, int] = {}
         self.extensions: set[str] = set()
+        self.sides: Json = {"doubleSided": True} if sequence.is_open else {}
         seam = sequence.seam
         self.copies = slice(None) if seam is None else seam.copies
         self.uv = None if seam is None else self.buffer.add(seam.uv.astype("f4"), FLOAT, "VEC2", VERTICES)
@@ -138,10 +141,11 @@ class _File:
             self.rough[rough] = len(self.materials)
             names = [name or "skin" for name, _ in self.sequence.materials]
             if surface.colour is None:
-                self.materials += [skin(name, self.sequence.worn()) for name in names]
+                worn = self.sequence.worn() or (None if looks(self.sequence.run).shades else CLAY)
+                self.materials += [{**skin(name, worn), **self.sides} for name in names]
             else:
                 pbr = {"metallicFactor": 0.0, "roughnessFactor": rough}
-                self.materials += [{"name": name, "pbrMetallicRoughness": pbr} for name in names]
+                self.materials += [{"name": name, **self.sides, "pbrMetallicRoughness": pbr} for name in names]
         return self.rough[rough]
 
     def _extras(self, surface: Surface) -> list[Json]:
@@ -247,7 +251,8 @@ class _File:
             more["extensions"] = {"KHR_materials_sheen": sheen}
         first = len(self.materials)
         for name, _ in self.sequence.materials:
-            self.materials.append({"name": f"{name or 'skin'} {surface.stage:g}", "pbrMetallicRoughness": pbr, **more})
+            named = {"name": f"{name or 'skin'} {surface.stage:g}", **self.sides}
+            self.materials.append({**named, "pbrMetallicRoughness": pbr, **more})
         return first
 
     def _image(self, pixels: np.ndarray) -> int:

@@ -45,7 +45,7 @@ def _fields(sequence: Sequence) -> dict[str, np.ndarray]:
 
     """
     # on the lattice a map needs no shape
-    on_lattice = lattice_fields(sequence.run, sequence.indices[0]) if sequence.lattice else {}
+    on_lattice = lattice_fields(sequence.run, sequence.indices[0], sequence.scale) if sequence.lattice else {}
     found = {name: values.ravel() for name, values in on_lattice.items()} or dict(next(iter(sequence)).fields)
     if not found:
         raise UnfitFormat("this result holds no field on its surface.", advice="Solve again with the field you want.")

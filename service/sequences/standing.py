@@ -84,6 +84,8 @@ def _placed(part: Part, sequence: Sequence, surface: Surface, upright: Array) ->
     frame = np.stack([right, out, ahead])
     points = foot + sequence.scale * (part.points @ frame)
     upright = normals(points, part.triangles)
+    # tips of sepals are triangles without area, which say no side
+    upright[np.linalg.norm(upright, axis=1) < 0.5] = out
     single: Many[Array] = [np.asarray(values, "f4") for values in (points, np.clip(part.colour, 0, 1), upright)]
     return Extra(part.name, single[0], np.asarray(part.triangles, "u4"), single[1], single[2], part.roughness)
 

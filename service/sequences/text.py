@@ -3,7 +3,7 @@
 PLY: colours as 8-bit sRGB, fields of the vertices as further float properties, texture coordinates of a mesh that came
 with some as `texcoord` of the faces, six numbers each, v upwards. OBJ: colours after the position (as
 Blender and MeshLab read them, sRGB from 0 to 1), texture coordinates where there are any, no normals; a triangle is in
-the groups (`g`) that its corners belong to by more than half, on the mean.
+the groups (`g`) that its corners belong to by more than half, on the mean, and of the material (`usemtl`) that it had.
 """
 
 from __future__ import annotations
@@ -86,24 +86,27 @@ def _obj(sequence: Sequence, surface: Surface) -> bytes:
         parts.append(_rows(b"vt", np.column_stack([seam.uv[:, 0], 1 - seam.uv[:, 1]])))
         corners = np.stack([corners, seam.triangles.astype(np.int64) + 1], axis=-1).reshape(-1, 6)
     line = b"f %d %d %d\n" if seam is None else b"f %d/%d %d/%d %d/%d\n"
-    for head, some in _grouped(surface):
+    for head, some in _parted(sequence, surface):
         parts.append(head)
         parts.append((line * len(corners[some])) % tuple(corners[some].ravel().tolist()))
     return b"".join(parts)
 
 
-def _grouped(surface: Surface) -> Iterator[tuple[bytes, slice]]:
-    """Yield which triangles in a row are in the same groups, and the line that says in which."""
+def _parted(sequence: Sequence, surface: Surface) -> Iterator[tuple[bytes, slice]]:
+    """Yield which triangles in a row are in the same groups and of one material, and the lines that say in which."""
     count = len(surface.triangles)
-    if not surface.groups:
-        yield b"", slice(0, count)
-        return
-    weights = np.stack([surface.fields[name] for name in surface.groups], -1)
-    inside = weights[surface.triangles].mean(axis=1) > 0.5
-    starts = np.flatnonzero((inside[1:] != inside[:-1]).any(axis=1)) + 1
+    names, owned = sequence.named(surface)
+    inside = np.empty((count, 0), bool)
+    if surface.groups:
+        inside = np.stack([surface.fields[name] for name in surface.groups], -1)[surface.triangles].mean(axis=1) > 0.5
+    alike = np.column_stack([inside, owned])
+    starts = np.flatnonzero((alike[1:] != alike[:-1]).any(axis=1)) + 1
     for begin, end in pairwise([0, *starts.tolist(), count]):
-        names = [name for name, there in zip(surface.groups, inside[begin], strict=True) if there]
-        yield f"g {' '.join(names) or 'off'}\n".encode(), slice(begin, end)
+        found = [name for name, there in zip(surface.groups, inside[begin], strict=True) if there]
+        group = f"g {' '.join(found) or 'off'}\n" if surface.groups else ""
+        # a name ends with its line
+        worn = f"usemtl {' '.join(names[owned[begin]].split()) or 'skin'}\n" if names else ""
+        yield (group + worn).encode(), slice(begin, end)
 
 
 def _said(sequence: Sequence, surface: Surface) -> list[str]:

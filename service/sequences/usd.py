@@ -55,6 +55,8 @@ def composed(sequence: Sequence, options: Options, pictures: Pictures | None = N
     mesh = UsdGeom.Mesh.Define(stage, f"/{name}")
     stage.SetDefaultPrim(mesh.GetPrim())
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    if sequence.is_open:
+        mesh.CreateDoubleSidedAttr(True)
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     about = sequence.about
     mesh.GetPrim().SetCustomData(

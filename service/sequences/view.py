@@ -127,6 +127,12 @@ class Sequence:
         # where triangles change each surface has its own
         return charts.own(self.run) if self.kept else None
 
+    @cached_property
+    def is_open(self) -> bool:
+        """Whether its first or last surface has a rim, as a leaf's, so that both sides are seen; a lattice has none."""
+        ends = () if self.lattice else {self.indices[0], self.indices[-1]}
+        return any(mesh.is_open(one.vertices, one.triangles) for one in map(self._bare, ends))
+
     @property
     def materials(self) -> tuple[tuple[str, NDArray[np.intp]], ...]:
         """The mesh's own materials: names, and the triangles of each, of all stages where those change.
@@ -137,6 +143,13 @@ class Sequence:
             return (("", np.arange(self.run.sizes.get("face", 0))),) if not self.lattice else (("", np.empty(0, int)),)
         names, owned = json.loads(self.run.attrs["materials"]), self.run["face_material"].values
         return tuple((name, np.flatnonzero(owned == i)) for i, name in enumerate(names) if (owned == i).any())
+
+    def named(self, surface: Surface) -> tuple[tuple[str, ...], Array]:
+        """Return the names of the mesh's own materials, none where it has none, and which one each triangle has (f)."""
+        if "face_material" not in self.run:
+            return (), np.zeros(len(surface.triangles), int)
+        owned = self.run["face_material"].values if surface.material is None else surface.material
+        return tuple(json.loads(self.run.attrs["materials"])), np.asarray(owned)
 
     def threads(self, surface: Surface, most: int) -> Threads | None:
         """Return the threads, at most so many, of a stage's surface; None where none grow, or triangles change."""
@@ -321,7 +334,7 @@ class Sequence:
             return Surface(stage, vertices, triangles, fields, **rest)
         position = _positions(self.run, index)
         vertices = mesh.vertices(position, spectra.poles(spectra.spectrum(position)))
-        fields = {name: _flat(values) for name, values in lattice_fields(self.run, index).items()}
+        fields = {name: _flat(values) for name, values in lattice_fields(self.run, index, self.scale).items()}
         return Surface(stage, vertices, mesh.triangles(self.lattice), fields)
 
 
@@ -344,14 +357,17 @@ def of_run(run: xr.Dataset) -> Sequence:
     )
 
 
-def lattice_fields(run: xr.Dataset, index: int) -> dict[str, Array]:
-    """Return the scalar fields (n, 2n) of one stage on the lattice; vectors as name_x, name_y, name_z."""
+def lattice_fields(run: xr.Dataset, index: int, scale: float = 1.0) -> dict[str, Array]:
+    """Return the scalar fields (n, 2n) of one stage on the lattice; vectors as name_x, name_y, name_z: lengths, which
+    are scaled as points are.
+    """
     found: dict[str, Array] = {}
     for name, variable in run.data_vars.items():
         if variable.dims == ("stage", "colatitude", "azimuth"):
             found[str(name)] = variable.values[index]
         elif name == "displacement":
-            found |= {f"{name}_{axis}": variable.values[index][..., k] for k, axis in enumerate("xyz")}
+            moved = variable.values[index] * variable.dtype.type(scale)
+            found |= {f"{name}_{axis}": moved[..., k] for k, axis in enumerate("xyz")}
     return found
 
 

@@ -181,7 +181,7 @@ def _answer(request: Request, asked: Asked) -> Response:
     timing = f"lookup;dur={1e3 * (looked - begin):.3f}, encode;dur={1e3 * (encoded - looked):.3f}"
     if is_json:
         return Response(body, headers={**headers, "Server-Timing": timing}, media_type=chosen.media_type)
-    headers["Content-Disposition"] = f'attachment; filename="{_filename(solver.name, query, words.stage, chosen)}"'
+    headers["Content-Disposition"] = f'attachment; filename="{_file(solver.name, name, query, words.stage, chosen)}"'
     wire = _wire({**headers, "Content-Type": chosen.media_type, "Content-Length": str(len(body))})
     made = Answer(tag, (*wire, (b"server-timing", b"kept;desc=answered-before")), body)
     answers.keep(made)
@@ -220,6 +220,8 @@ def _links(request: Request, resolution: int, detail: level.Detail) -> dict[str,
     return {name: f"{path}?{urlencode([*pairs, ('format', name)])}" for name in others}
 
 
-def _filename(solver: str, query: ShapeQuery, symbol: str, chosen: Format) -> str:
+def _file(solver: str, table: str, query: ShapeQuery, symbol: str, chosen: Format) -> str:
     numbers: Mapping[str, float] = {**query.point, symbol: query.stage}
-    return "-".join([solver, *(f"{name}{value:g}" for name, value in numbers.items())]) + chosen.suffix
+    # fruits of several families have the same numbers
+    whose = [solver] if table == "default" else [solver, table]
+    return "-".join([*whose, *(f"{name}{value:g}" for name, value in numbers.items())]) + chosen.suffix

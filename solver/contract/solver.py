@@ -32,8 +32,8 @@ __all__ = ["Cost", "Solver", "StageAxis", "finish"]
 
 T = TypeVar("T")
 
-#: Distance [r1] within which two fresh surfaces are of one fruit: its skin may be thicker or thinner.
-_ALIKE = 0.04
+#: Distance [r1] within which two fresh surfaces are of one fruit, but for their skins.
+_ALIKE = 0.02
 _QUALITIES: tuple[Quality, ...] = ("preview", "default", "fine")
 #: Fields that are of a mesh, not of the lattice.
 _MESHED = frozenset(("mesh_position", "triangle"))
@@ -186,7 +186,7 @@ class Solver:
             return None
         said, shapes = self._known_presets
         points = asked.points(*_angles())
-        alike = [name for name, one in shapes.items() if np.abs(one - points).max() < _ALIKE]
+        alike = [name for name, one in shapes.items() if _distance(points, one) < _ALIKE]
         if len({of(name) for name in alike}) > 1:
             full = {**plain, **values}
             alike = [n for n in alike if all(_same(said[n].get(f), full.get(f)) for f in self.presets[n])]
@@ -341,6 +341,14 @@ class Solver:
 def _angles() -> tuple[Floats, Floats]:
     """Return colatitudes and azimuths at which fresh shapes are compared."""
     return np.meshgrid(np.linspace(0, np.pi, 9), np.linspace(0, 2 * np.pi, 8, endpoint=False), indexing="ij")
+
+
+def _distance(points: Floats, others: Floats) -> float:
+    """Return how far two fresh surfaces (..., 3) are apart at most, but for a skin that is thicker all over."""
+    away = points / np.linalg.norm(points, axis=-1, keepdims=True)
+    between = others - points
+    thicker = (between * away).sum(axis=-1).mean()
+    return float(np.abs(between - thicker * away).max())
 
 
 def _same(one: Any, other: Any) -> bool:

@@ -92,6 +92,7 @@ def test_a_mesh_of_one_s_own_gets_its_cache(stored: tuple[Store, str], tmp_path:
     words = [key, "--store", str(store.root), "--mesh", str(tmp_path / "my.stl")]
     code, said = run(*words, "--out", str(tmp_path / "my.pc2"), "--json")
     assert code == 0, said
+    assert json.loads(said)["length"] == "the unit of my.stl"
     points = np.frombuffer((tmp_path / "my.pc2").read_bytes(), "<f4", offset=32).reshape(2, -1, 3)
     assert np.allclose(np.linalg.norm(points, axis=2), 4, atol=1e-5)  # this fruit does not move
     code, _ = run(*words, "--out", str(tmp_path / "my.glb"))

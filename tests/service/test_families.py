@@ -54,6 +54,8 @@ def test_a_preset_fills_what_is_not_said(client: httpx.Client) -> None:
     said = {"preset": "raisin", "s": 0.2, "te": 0.02, "gamma": 5, "resolution": 16, "format": "npz"}
     answer = client.get(SHAPE, params=said)
     assert answer.status_code == 200
+    # fruits of other families have the same numbers
+    assert 'filename="dehydration-raisin-te0.02-gamma5-s0.2.npz"' in answer.headers["content-disposition"]
     fresh = SOLVER.parse({"te": 0.02, "gamma": 5.0}, "raisin").surface(*lattice(16))
     with np.load(io.BytesIO(answer.content)) as archive:
         assert np.abs(archive["position"] - fresh - displacement(0.02, 5.0, 0.2, 16)).max() < 1e-5

@@ -59,6 +59,9 @@ def test_a_glb_has_stem_calyx_threads_and_pictures_for_each_stage(run: xr.Datase
     names = [[document["materials"][p["material"]]["name"] for p in mesh["primitives"]] for mesh in document["meshes"]]
     assert names == [["skin 0", "stem", "calyx"], ["skin 5", "stem", "calyx", "hyphae"]]
     for mesh in document["meshes"]:
+        for primitive in mesh["primitives"]:  # tips of sepals too, which have no area
+            upright = accessor(document, binary, primitive["attributes"]["NORMAL"])
+            assert np.abs(np.linalg.norm(upright, axis=1) - 1).max() < 1e-5
         skin = document["materials"][mesh["primitives"][0]["material"]]
         pbr = skin["pbrMetallicRoughness"]
         assert pbr["roughnessFactor"] == 1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import struct
 import zipfile
 from pathlib import Path
@@ -14,7 +15,7 @@ import xarray as xr
 from PIL import Image
 from pxr import Usd, UsdGeom, UsdShade
 
-from service.sequences import EXPORTS, Options, of_run, prepared, write
+from service.sequences import EXPORTS, STILLS, Options, of_run, prepared, write
 from service.sequences.matter import _prims
 from solver.contract import Need
 from solver.decay import SOLVER
@@ -97,6 +98,18 @@ def test_glb_and_usd_hold_the_mesh_s_own_texture_coordinates(given: dict, rotten
     assert again["materials"] == given["materials"]
     path.write_bytes(write(prepared(fresh(again), Options(), 0.0), EXPORTS["animation"], Options()))
     assert read(path)["uv"] == again["uv"]
+
+
+def test_obj_says_of_which_material_each_triangle_is(given: dict, rotten: xr.Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "ring.obj"
+    path.write_bytes(STILLS["obj"](prepared(rotten, Options(), 9.0), Options()))
+    again = read(path)
+    assert again["materials"] == given["materials"]
+    assert again["face_materials"] == given["face_materials"]
+    assert again["faces"] == given["faces"]
+    run = rotten.assign_attrs(materials=json.dumps(["two\nlines", ""]))
+    words = [line for line in STILLS["obj"](prepared(run, Options(), 9.0), Options()).splitlines() if b"usemtl" in line]
+    assert words == [b"usemtl two lines", b"usemtl skin"]
 
 
 def fresh(given: dict) -> xr.Dataset:

@@ -37,6 +37,42 @@ def test_what_is_z_up_is_turned_and_not_mirrored() -> None:
         np.testing.assert_array_equal(np.cross(other[0], other[1])[1], np.cross(one[0], one[1])[2])
 
 
+def test_lengths_of_fields_are_scaled_as_points_are() -> None:
+    ball = shrinking()
+    moved = ball["position"] - ball["position"][0]
+    run = ball.assign(displacement=moved.astype("f4"))
+    plain, large = (trimesh.load(io.BytesIO(made(run, "ply", scale=k)), "ply", process=False) for k in (1, 20))
+    fields = [one.metadata["_ply_raw"]["vertex"]["data"] for one in (plain, large)]
+    assert np.abs(fields[0]["displacement_x"]).max() > 0.5
+    for axis in "xyz":
+        name = f"displacement_{axis}"
+        np.testing.assert_allclose(fields[1][name], 20 * fields[0][name], rtol=1e-6)
+        np.testing.assert_allclose(fields[1][axis], 20 * fields[0][axis], rtol=1e-6)
+
+
+def half(rim: bool) -> xr.Dataset:
+    """A ball whose triangles may change, or what is left of it without its lower half; seams split its vertices."""
+    ball = trimesh.creation.icosphere(2)
+    faces = np.array(ball.faces)
+    faces = faces[ball.triangles_center[:, 1] > 0] if rim else faces
+    points, corners = np.array(ball.vertices, "f4")[faces.ravel()], np.arange(3 * len(faces)).reshape(-1, 3)
+    frames = [meshes.Frame(points * (1 + k), corners, {}) for k in range(2)]
+    return xr.Dataset(meshes.changing(frames), {"stage": [0.0, 1.0]}, {"solver": "growth"})
+
+
+@pytest.mark.parametrize("rim", [False, True])
+def test_a_sheet_is_seen_from_both_sides_and_wears_no_fruits_skin(rim: bool, tmp_path: Path) -> None:
+    document, _ = parsed(made(half(rim), "animation"))
+    for material in document["materials"]:
+        assert material.get("doubleSided", False) is rim
+        red, green, blue, _ = material["pbrMetallicRoughness"]["baseColorFactor"]
+        assert red < 1.5 * blue  # plain clay
+        assert blue < green < red
+    (tmp_path / "s.usdc").write_bytes(made(half(rim), "usdc"))
+    stage = Usd.Stage.Open(str(tmp_path / "s.usdc"))
+    assert bool(UsdGeom.Mesh(stage.GetDefaultPrim()).GetDoubleSidedAttr().Get()) is rim
+
+
 # --- vertex caches: numpy's own records, from the layouts in the formats' documents -------------------------------
 
 

@@ -28,7 +28,8 @@ def test_a_raisin_stays_one_with_another_skin_and_a_sphere_is_of_any_size() -> N
     assert fresh is not None
     grape = np.ptp(fresh.points(*lattice(32)).reshape(-1, 3), axis=0).max() * solver.sizes["raisin"]
     assert 0.015 < grape < 0.02  # dried it is 1.5 cm long: tests/service/blender measures one
-    assert solver.metres(solver.parse({}, "sphere").model_dump(mode="json")) is None
+    for te in (0.005, 0.04, 0.08, 0.085, 0.2):
+        assert solver.metres(solver.parse({"te": te}, "sphere").model_dump(mode="json")) is None
     assert solver.metres(solver.parse({"r4": 0.52}, "raisin").model_dump(mode="json")) is None
 
 

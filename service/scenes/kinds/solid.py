@@ -20,10 +20,11 @@ from scipy.spatial import ConvexHull, QhullError
 
 from solver.arrays import Array, Floats
 
+from ...formats.mesh import is_open
 from ...limits import waited
 from .kind import RUNGS
 
-__all__ = ["Level", "Solid", "merged"]
+__all__ = ["Level", "Solid"]
 
 #: Weight of a colour's error beside that of a position over the mesh's size.
 _COLOURS = 0.3
@@ -155,11 +156,7 @@ class Solid:
     @cached_property
     def is_open(self) -> bool:
         """Whether it has a rim, so that its inside may be seen."""
-        corners = merged(self.points)[self._body]
-        edges = np.sort(np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]], corners[:, [2, 0]]]), axis=1)
-        edges = edges[edges[:, 0] != edges[:, 1]]
-        _, counts = np.unique(edges, axis=0, return_counts=True)
-        return bool((counts % 2 == 1).any())
+        return is_open(self.points, self._body)
 
     def holds(self, point: Floats) -> bool:
         """Return whether a point (3) is inside: the solid angles of the triangles add up to more than half."""
@@ -189,8 +186,3 @@ class Solid:
             corners = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
         points = np.concatenate(found)
         return np.asarray(points[np.linalg.norm(points, axis=1) > 1e-9 * np.abs(points).max()])
-
-
-def merged(points: Array) -> Array:
-    """Return for each point (v, 3) the number of its place: seams split vertices, and leave them where they are."""
-    return np.unique(points, axis=0, return_inverse=True)[1].ravel()

@@ -85,13 +85,15 @@ def main(zipped: str, address: str, token: str, out: str) -> None:
     module._tick()
     seen["moved"] = positions(fruit)
     seen["trust"] = state.trust
-    fruit["s"] = 0.02
+    fruit["s"], fruit.scale = 0.02, (0.5, 0.5, 0.5)
     bpy.ops.wizen.run(quality="preview", stages=2)
     wait(module, lambda: state.jobs and all(j["state"] in ("done", "failed") for j in state.jobs.values()))
     seen["jobs"] = list(state.jobs.values())
     bpy.ops.wizen.fetch(address=next(iter(state.jobs)))
     wait(module, lambda: any("run" in thing.name for thing in bpy.data.objects))
     run = next(thing for thing in bpy.data.objects if "run" in thing.name)
+    seen["run"] = {"scale": list(run.scale), "skins": [m.name for m in run.data.materials]}
+    seen["run"]["fruits"] = [m.name for m in fruit.data.materials]
     keys = run.data.shape_keys.key_blocks
     seen["keys"] = [key.name for key in keys]
     cache = Path(out).with_suffix(".pc2")

@@ -121,6 +121,8 @@ def test_sliders_move_the_mesh_to_what_they_say_last(seen: dict[str, Any]) -> No
 
 def test_a_job_runs_and_comes_as_shape_keys_that_move_as_its_cache(seen: dict[str, Any]) -> None:
     assert [job["state"] for job in seen["jobs"]] == ["done"]
+    assert seen["run"]["scale"] == [0.5, 0.5, 0.5]
+    assert seen["run"]["skins"] == seen["run"]["fruits"] != []
     assert seen["keys"] == ["Basis", "frame 1", "frame 13"]
     assert seen["frames"] == 2
     assert seen["keys_moved"] > 1e-3

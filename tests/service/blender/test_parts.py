@@ -82,6 +82,30 @@ def test_points_are_the_tables_shape_turned_upright(parts: Any, tmp_path: Path) 
     assert np.linalg.det(np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])) == 1  # turned, not mirrored
 
 
+@pytest.mark.parametrize(
+    ("family", "values", "wanted"),
+    [
+        ("prolate-01", {"r4": 0.8}, {"r2": 0.9363, "r3": 0.8386, "r8": 0.8, "te": 0.01, "rs1": 0.3, "mirrors": "xz"}),
+        ("stone-radius", {"rs1": 0.5, "te": 0.035}, {"rs2": 0.5, "r4": 1.0, "te": 0.035}),
+        ("sphere-01", {"gamma": 20.0}, {"te": 0.01, "rs1": 0.4, "gamma": 20.0, "mirrors": "xyz"}),
+        ("raisin", {**RAISIN_AT}, {"r2": 0.7, "r4": 0.45, **RAISIN_AT}),
+    ],
+)
+def test_a_run_is_of_the_familys_fruit_and_not_of_defaults(
+    parts: Any, family: str, values: dict[str, float], wanted: dict[str, Any]
+) -> None:
+    from solver import registry
+
+    from ..conftest import client_of
+
+    with client_of(starter.ROOT) as http:
+        service = parts["client"].Service("http://nowhere")
+        service.ask = lambda path, data=None, method=None: http.get(path).raise_for_status().content
+        found = service.parameters("dehydration", family, {**values, "s": 0.1})
+    assert wanted.items() <= found.items()
+    registry.get("dehydration").parse(found)  # as a job takes them
+
+
 @pytest.mark.parametrize("n", [4, 9])
 def test_the_mesh_is_the_lattice_s_triangles(parts: Any, n: int) -> None:
     """Of quads, Blender would choose the diagonal: one along which folded shapes cross themselves."""

@@ -242,6 +242,9 @@ def test_the_command_reads_a_file_beside_the_scene(tmp_path: Path) -> None:
     (tmp_path / "bad.toml").write_text(text.replace("NAME", "evil.stl"))
     refused = CliRunner().invoke(app, ["scene", str(tmp_path / "bad.toml")])
     assert refused.exit_code != 0
+    gone = CliRunner().invoke(app, ["scene", str(tmp_path / "gone.toml")])
+    assert "cannot be read: No such file" in " ".join(gone.output.split())
+    assert "Errno" not in gone.output
 
 
 def test_parameters_of_an_item_bring_the_files_beside_them(tmp_path: Path) -> None:

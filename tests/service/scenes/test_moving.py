@@ -51,6 +51,7 @@ def test_each_knot_of_a_curve_is_the_tables_shape_at_its_time(compress: bool) ->
     base = array(document, binary, primitive["attributes"]["POSITION"]).astype(float)
     n = scene.report["detail"]["lattices"][0]
     assert mesh["weights"] == [0, 0]
+    assert mesh["extras"]["targetNames"] == ["0.1", "0.25"]  # what Blender calls the shape keys
     for (_, stage), target in zip(CURVE, [None, *primitive["targets"]], strict=True):
         steps = 0 if target is None else array(document, binary, target["POSITION"]).astype(float)
         assert np.abs((base + steps) * grow - own(stage, n)).max() < 4e-4
@@ -60,6 +61,22 @@ def test_each_knot_of_a_curve_is_the_tables_shape_at_its_time(compress: bool) ->
     sampler = animation["samplers"][channel["sampler"]]
     assert array(document, binary, sampler["input"]).ravel().tolist() == [0.5, 2, 3]
     assert array(document, binary, sampler["output"]).reshape(3, 2).tolist() == [[0, 0], [1, 0], [0, 1]]
+
+
+def test_normals_that_turn_over_arrive_all_the_same() -> None:
+    """From fresh to wrinkled some turn by more than a byte's difference holds."""
+    scene = made([{"preset": "jujube1", "curve": [[0, 0.0], [2, 0.3]], "transforms": [{}]}])
+    document, binary = parsed(scene.data)
+    [mesh] = document["meshes"]
+    [primitive] = mesh["primitives"]
+    n = scene.report["detail"]["lattices"][0]
+    table = ShapeTable.open(starter.ROOT, "jujube1", surfaces=surface)
+    shape = table.at({"te": 0.02, "gamma": 10.0}, 0.3, resolution=n)
+    truth = np.concatenate([shape.normals.reshape(-1, 3), shape.pole_normals])
+    base = array(document, binary, primitive["attributes"]["NORMAL"]).astype(float)
+    steps = array(document, binary, primitive["targets"][0]["NORMAL"])
+    assert np.abs(truth - base).max() > 1.1
+    assert np.abs(base + steps - truth).max() < 0.01
 
 
 def test_individuals_that_change_are_where_those_are_that_stay() -> None:
@@ -109,6 +126,9 @@ def test_a_camera_that_moved_gets_what_it_lacks() -> None:
     document, _ = parsed(again.data)
     assert [one["extras"]["etag"] for one in document["meshes"]] == tags
     assert all(one["extras"]["known"] for one in document["meshes"])
+    # an animation of weights has targets, whoever holds the mesh
+    [fading] = [one for one in document["meshes"] if "weights" in one]
+    assert len(fading["weights"]) == len(fading["primitives"][0]["targets"]) == len(CURVE) - 1
     assert len(again.data) < 0.05 * len(first.data)
     nearer = {**CAMERA, "position": [-1, 0, 6]}
     moved = make(parse({"camera": nearer, "items": items, "known": tags}), TABLES, 512, "glb", False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import re
@@ -11,6 +12,7 @@ from typing import Any
 import httpx
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial import cKDTree
 
 from service.scenes import compose, seen
@@ -143,6 +145,17 @@ def test_kinds_out_of_sight_are_not_computed() -> None:
     assert told[1]["computed"] == []
     assert told[1]["skipped"] == {"out of the picture": 1}
     assert "expected_error" not in told[1]
+
+
+@pytest.mark.parametrize("compress", [False, True])
+def test_a_picture_of_nothing_is_a_file_that_readers_accept(compress: bool) -> None:
+    """glTF has neither empty lists nor buffers of no bytes, and nothing of it is compressed."""
+    data = made([at([0, 0, 90])], compress=compress).data
+    document, _ = parsed(data)
+    assert int.from_bytes(data[8:12], "little") == len(data) == 20 + int.from_bytes(data[12:16], "little")
+    assert not {"accessors", "bufferViews", "buffers", "extensionsRequired"} & document.keys()
+    assert [] not in document.values()
+    assert not trimesh.load(io.BytesIO(data), "glb").geometry
 
 
 def test_far_things_are_coarse_and_farther_ones_left_out() -> None:
