@@ -55,7 +55,9 @@ def build(
     """
     jobs = finished(store, solver.name, choice)
     if not jobs:
-        raise EmptyTable(f"there are no finished runs of {solver.name}.", "Run a sweep, or say another solver or plan.")
+        fitting = "" if choice[:3] == (None,) * 3 else " in the plan, quality and version asked for"
+        said = f"there are no finished runs of {solver.name}{fitting}."
+        raise EmptyTable(said, "Run a sweep, or say another solver or plan.")
     agree(jobs)
     axes = solver.params.axes
     chosen = fullest(jobs, [{**read_axes(job.params, axes), **rest_of(job.params, axes)} for job in jobs])

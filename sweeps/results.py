@@ -12,10 +12,12 @@ listed. They never change; each is read once in a process.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import operator
 import re
 from collections.abc import Callable, Iterable, Mapping, MutableMapping, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -23,6 +25,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from solver import quantities, registry
 from solver.contract import SolverError
 from store import seal
+from store.canonical import canonical
 from store.errors import NO_DAMAGE, CorruptShard
 from store.store import Store
 
@@ -31,7 +34,7 @@ from .errors import InvalidOption
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["Row", "columns", "dataset", "find", "resolve"]
+__all__ = ["Row", "columns", "dataset", "find", "named", "resolve"]
 
 Value = float | int | bool | str
 
@@ -42,6 +45,8 @@ _OPERATORS: Mapping[str, Callable[[Any, Any], bool]] = {
 _CONDITION = re.compile(rf"\s*(\w+)\s*({'|'.join(_OPERATORS)})\s*(.+?)\s*")
 #: Fewest characters of a key that stand for it.
 _SHORTEST = 4
+#: Most characters of a parameter that is shown as it is; of larger ones (maps, meshes) letters of their hash.
+_LONGEST = 80
 
 
 class Row(NamedTuple):
@@ -80,11 +85,12 @@ def find(
         damaged: takes what is wrong with results that cannot be read, by key; the others are listed.
 
     Raises:
-        InvalidOption: a condition that cannot be read, or a name that no result has.
+        InvalidOption: a condition that cannot be read or met, or a name that no result has.
         CorruptShard: a result is damaged, and `damaged` is not given.
 
     """
-    conditions = [_condition(part) for text in where for part in text.split(",")]
+    where = tuple(where)
+    conditions = _conditions(where)
     found: list[Row] = []
     for key in iter(store.keys()):
         path = store.shard_path(key)
@@ -96,7 +102,8 @@ def find(
             damaged[key] = error
             continue
         found += rows[-1:] if last else rows
-    _check([name for name, _, _ in conditions] + ([sort.removeprefix("-")] if sort else []), found)
+    _check(named(where, sort), found)
+    _check_numbers(conditions, found)
     if solver is not None:
         found = [row for row in found if row.solver == solver]
     kept = [row for row in found if all(_meets(row.values, *condition) for condition in conditions)]
@@ -107,6 +114,17 @@ def find(
     having = [row for row in kept if name in row.values]
     having.sort(key=lambda row: _order(row.values[name]), reverse=sort.startswith("-"))
     return having + [row for row in kept if name not in row.values]
+
+
+def named(where: Iterable[str], sort: str | None) -> list[str]:
+    """Return the names that conditions and an order are about, as they come.
+
+    Raises:
+        InvalidOption: a condition that cannot be read.
+
+    """
+    order = [sort.removeprefix("-")] if sort else []
+    return list(dict.fromkeys([name for name, _, _ in _conditions(where)] + order))
 
 
 def columns(rows: Sequence[Row]) -> list[str]:
@@ -125,16 +143,41 @@ def dataset(rows: Sequence[Row]) -> xr.Dataset:
     import numpy as np
     import xarray as xr
 
-    values = [row.values for row in rows]
+    values, said = [row.values for row in rows], _said(rows)
     variables = {}
     for name in columns(rows):
         column = [each.get(name) for each in values]
-        words = any(isinstance(value, str) for value in column)
-        data = [str(v or "") for v in column] if words else [np.nan if v is None else float(v) for v in column]
-        known = quantities.QUANTITIES.get(name)
-        attrs = {} if words or known is None else {"units": known.units, "long_name": known.long_name}
-        variables[name] = ("row", np.array(data, dtype=str if words else float), attrs)
-    return xr.Dataset(variables)
+        attrs = said.get(name, {"units": "1", "long_name": f"parameter {name}"})
+        if any(isinstance(value, str) for value in column):
+            words = ["" if value is None else str(value) for value in column]
+            variables[name] = ("row", np.array(words), {"long_name": attrs["long_name"]})
+            continue
+        # a seed beyond 2^53 is no floating-point number
+        whole = bool(column) and all(type(value) is int for value in column)
+        data = column if whole else [np.nan if value is None else float(value) for value in column]
+        variables[name] = ("row", np.array(data, dtype="int64" if whole else float), attrs)
+    about = {"title": "results, one row per stage of each run", "Conventions": "CF-1.11"}
+    return xr.Dataset(variables, attrs=about)
+
+
+def _said(rows: Sequence[Row]) -> dict[str, dict[str, str]]:
+    """Return unit and meaning of what the rows have, by name, as far as it is known: solvers may not be installed."""
+    found = {name: {"long_name": name} for name in ("key", "solver", "version")}
+    stages: list[dict[str, str]] = []
+    for solver in dict.fromkeys(row.solver for row in rows):
+        with suppress(SolverError):
+            chosen = registry.get(solver)
+            extras = {name: field.json_schema_extra for name, field in chosen.params.model_fields.items()}
+            units = {name: str(extra.get("units", "1")) for name, extra in extras.items() if isinstance(extra, dict)}
+            for name, unit in {**units, **chosen.axis_units()}.items():
+                found.setdefault(name, {**quantities.unit_attrs(unit), "long_name": f"parameter {name}"})
+            stages.append({"units": chosen.stages.units, "long_name": chosen.stages.long_name})
+    for name in dict.fromkeys(["stage", *(name for row in rows for name in row.numbers)]):
+        if known := quantities.QUANTITIES.get(name):
+            found[name] = {"units": known.units, "long_name": known.long_name}
+    if len(stages) == 1:  # of several solvers' stages there is no one meaning
+        found["stage"] = stages[0]
+    return found
 
 
 def resolve(store: Store, beginning: str) -> str:
@@ -186,20 +229,35 @@ def _rows(path: Path, stamp: int) -> tuple[Row, ...]:
 
 
 def _scalars(solver: str, params: Mapping[str, Any]) -> dict[str, Value]:
-    """Return the parameters of one value each, by the names that they are swept by."""
+    """Return the parameters by the names that they are swept by; what no such name reaches in words."""
     found = {name: value for name, value in params.items() if isinstance(value, int | float | str)}
+    rest = {name: _words(value) for name, value in params.items() if isinstance(value, list | dict) and value}
     try:
         axes = registry.get(solver).params.axes
     except SolverError:
-        return found  # a solver that is not installed here
+        return {**found, **rest}  # a solver that is not installed here
     for name, (field, index) in axes.items():
         value = params.get(field)
         if index is not None and isinstance(value, list) and index < len(value):
             value = value[index]
         if isinstance(value, int | float):
             found.pop(field, None)
+            rest.pop(field, None)
             found[name] = value
-    return found
+    return {**found, **rest}
+
+
+def _words(value: Any) -> str:
+    """Return what tells a list or a map from another: as it is or, of what is long, some letters of its hash."""
+    numbers = isinstance(value, list) and all(isinstance(one, int | float) for one in value)
+    text = " ".join(f"{one:.12g}" for one in value) if numbers else json.dumps(value, sort_keys=True)
+    if len(text) <= _LONGEST:
+        return text
+    return f"#{hashlib.sha256(canonical(value)).hexdigest()[:12]}"
+
+
+def _conditions(where: Iterable[str]) -> list[tuple[str, str, str]]:
+    return [_condition(part) for text in where for part in text.split(",")]
 
 
 def _condition(text: str) -> tuple[str, str, str]:
@@ -209,6 +267,10 @@ def _condition(text: str) -> tuple[str, str, str]:
             f"--where {text.strip()!r} is no condition.", "Write for example te<0.03, or solver=growth."
         )
     name, sign, value = match.groups()
+    if re.search("[<>=]", value):
+        raise InvalidOption(
+            f"--where {text.strip()!r} says more than one condition.", "Part them by commas: te<0.03,gamma>10."
+        )
     return name, sign, value
 
 
@@ -232,6 +294,15 @@ def _number(text: str) -> float | None:
 
 def _order(value: Value) -> tuple[bool, Any]:
     return isinstance(value, str), value
+
+
+def _check_numbers(conditions: Iterable[tuple[str, str, str]], rows: Sequence[Row]) -> None:
+    """Refuse words where all results have a number: no row would ever meet that."""
+    for name, sign, wanted in conditions:
+        values = [row.values[name] for row in rows if name in row.values]
+        if _number(wanted) is None and values and not any(isinstance(value, str) for value in values):
+            said = f"--where {f'{name}{sign}{wanted}'!r}: {name} is a number, and {wanted!r} is none."
+            raise InvalidOption(said, f"Write for example {name}<0.03; several conditions are parted by commas.")
 
 
 def _check(names: Iterable[str], rows: Sequence[Row]) -> None:

@@ -3,7 +3,8 @@
 Of families in the package, at random points between their samples, and at some of these: from which residual, and how
 far, 600 steps of the solver move what each method looks up, and how its statistics compare with what becomes of it
 (record dehydration-score). Fruits keep the bumps and the pattern that runs begin with, which come with the package. The
-record is kept after each family, and what it has is not done again.
+record is kept after each family, and what it has of this version of the solver is not done again; of others it keeps
+what is of the tables of now, until these families are asked for.
 
 With --tier, of fruits of the default family and of that of te = 0.01 in the package instead: the tier between table and
 run, with seconds by the clock and of the processor, on as many threads as there are, after a first one (record
@@ -96,7 +97,6 @@ def _score(names: Sequence[str] | None, stages: Sequence[float], count: int) -> 
     kept = figures.load(NAME)["runs"] if NAME in figures.names() else []
     about = {
         name: {
-            "version": SOLVER.version,
             "family": name,
             "digest": one.digest,
             "stages": [*stages],
@@ -113,10 +113,10 @@ def _score(names: Sequence[str] | None, stages: Sequence[float], count: int) -> 
     # of tables that are no more, or have changed, nothing is kept
     runs = {row["family"]: row for row in kept if _is_of(row, about.get(row["family"], {}))}
     for name in names or about:
-        if name in runs:
+        if name in runs and runs[name]["version"] == SOLVER.version:
             continue
-        begin = time.process_time()
-        runs[name] = {**about[name], "each": list(_measured(opened[name], package, stages, count))}
+        begin, made = time.process_time(), {"version": SOLVER.version, **about[name]}
+        runs[name] = {**made, "each": list(_measured(opened[name], package, stages, count))}
         figures.keep(NAME, [runs[k] for k in about if k in runs], "dehydration", steps=balance.STEPS)
         print(f"{name}: {time.process_time() - begin:.0f} s of the processor", file=sys.stderr, flush=True)
 
@@ -142,7 +142,7 @@ def table(record: Row) -> str:
     """Return, by family and stage, the default's figures over those of the others, which goals it misses, and where
     another does better.
     """
-    head = ("family", "s", "residual", *_CALLED.values(), "missed", "worse than")
+    head = ("family", "version", "s", "residual", *_CALLED.values(), "missed", "worse than")
     lines = []
     for run in record["runs"]:
         for stage in run["stages"]:
@@ -152,7 +152,7 @@ def table(record: Row) -> str:
             residual = f"{own.residual_placed:.2f} to {own.residual:.0e}"
             missed = ", ".join(_short(name) for name in _WANTED if not _is_met(own, name)) or "-"
             worse = "; ".join(filter(None, (_worse(own, found[other], other) for other in _OTHERS))) or "-"
-            lines.append([run["family"], f"{stage:g}", residual, *cells, missed, worse])
+            lines.append([run["family"], run["version"], f"{stage:g}", residual, *cells, missed, worse])
     return markdown(head, lines)
 
 

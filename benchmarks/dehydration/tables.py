@@ -174,24 +174,28 @@ def _full(record: Row) -> str:
 
 def _whole(record: Row) -> str:
     rows = _measured(record, "")
-    fine = [row["roughness"] for row in rows if row["quality"] == "fine" and "failed" not in row]
     lines = []
     for row in rows:
-        name = f"{row['quality']}, {row['seed']}"
+        name = [f"{row['gamma']:g}", f"{row['quality']}, {row['seed']}"]
         if "failed" in row:
-            lines.append([name, row["failed"], *[""] * 6])
+            lines.append([*name, row["failed"], *[""] * 8])
             continue
+        same = [other for other in rows if other["gamma"] == row["gamma"] and "failed" not in other]
+        fine = [other["roughness"] for other in same if other["quality"] == "fine"]
         off = [x / statistics.mean(truth) - 1 for x, *truth in zip(row["roughness"], *fine, strict=True)]
         missed = [f"{s:g}" for s, fine in zip(STAGES, row["converged"], strict=True) if not fine]
         lines.append(
             [
-                name, f"{row['elements']:,}", f"{row['steps']:,}", _four(row["cpu"], "{:.0f}"), _four(row["roughness"]),
-                _share(off), _four(row["residual"], "{:.1e}"), ", ".join(missed) or "none",
+                *name, f"{row['elements']:,}", f"{row['steps']:,}", _four(row["cpu"], "{:.0f}"),
+                _four(row["roughness"]), _share(off), _four(row["buckle_count"], "{:.0f}"),
+                _four(row["residual"], "{:.1e}"), ", ".join(missed) or "none",
                 f"{row['least_jacobian'][-1]:.2f}", _depth(row["penetration"]),
             ]
         )  # fmt: skip
-    head = ("quality, seed", "elements", "steps", "CPU s to each stage", "roughness [r1]", "against fine's mean")
-    return markdown((*head, "residual", "not converged at s =", "least J", "deepest [te]"), lines)
+    head = ("gamma", "quality, seed", "elements", "steps", "CPU s to each stage", "roughness [r1]")
+    return markdown(
+        (*head, "against fine's mean", "buckles", "residual", "not converged at s =", "least J", "deepest [te]"), lines
+    )
 
 
 def _merging(record: Row) -> str:

@@ -131,7 +131,7 @@ def export(asked: _Asked) -> None:
         "bytes": len(data),
         "vertices": sequence.samples if bound is None else len(sequence) * len(bound.points),
         "stages": list(sequence.stages),
-        "length": sequence.length if bound is None else f"the unit of {asked.mesh.name}",
+        "length": sequence.length if asked.mesh is None else f"the unit of {asked.mesh.name}",
     }
     if bound is not None:
         document["mesh"] = bound.report()

@@ -47,7 +47,8 @@ def say(error: ValidationError, fields: Mapping[str, Any], typed: Mapping[Place,
     """
     parts, strange = [], False
     for item in error.errors():
-        where = _called(item["loc"], typed)
+        # of a tuple each value that is missing is found: one sentence about the whole says it
+        where = _called(item["loc"][:1] if _too_few(item) else item["loc"], typed)
         if item["type"] == "extra_forbidden":
             hint = _hint(fields, item["loc"])
             strange |= not hint and len(item["loc"]) == 1
@@ -60,7 +61,7 @@ def say(error: ValidationError, fields: Mapping[str, Any], typed: Mapping[Place,
             parts.append(f"{where + ': ' if where else ''}{message}{shown}")
     if strange:
         parts.append(f"known: {', '.join(sorted(fields))}")
-    return "; ".join(parts)
+    return "; ".join(dict.fromkeys(parts))
 
 
 def advise(error: ValidationError, typed: Mapping[Place, str] = MappingProxyType({})) -> str:
@@ -101,14 +102,20 @@ def _form(item: Mapping[str, Any], fields: Mapping[str, Any]) -> str:
     place, kind = item["loc"], item["type"]
     field = fields.get(str(place[0])) if place else None
     annotation, default = getattr(field, "annotation", None), getattr(field, "default", None)
-    several = len(place) == 2 and kind == "missing" and isinstance(place[1], int)
-    if isinstance(default, tuple) and default and (several or (len(place) == 1 and kind in ("tuple_type", "too_long"))):
+    several = _too_few(item) or (len(place) == 1 and kind in ("tuple_type", "too_long"))
+    if isinstance(default, tuple) and default and several:
         return f"{place[0]} needs {len(default)} values, such as {json.dumps(default)}"
     if len(place) == 1 and kind == "model_type" and len(models := _models(annotation)) == 1:
         needed = [name for name, inner in models[0].model_fields.items() if inner.is_required()]
         more = [name for name in models[0].model_fields if name not in needed]
         return f"it needs an object with {', '.join(needed)}{' and, if wanted, ' * bool(more)}{', '.join(more)}"
     return ""
+
+
+def _too_few(item: Mapping[str, Any]) -> bool:
+    """Return whether a tuple lacks a value."""
+    place = item["loc"]
+    return len(place) == 2 and item["type"] == "missing" and isinstance(place[1], int)
 
 
 def _called(place: Place, typed: Mapping[Place, str]) -> str:

@@ -227,7 +227,11 @@ def _small(samples: Samples, rows: list[Rows], solver: Solver, band: int) -> xr.
         for name in common
     }
     coords = {
-        "stage": ("stage", np.array(samples.need["stages"]), quantities.attrs("stage")),
+        "stage": (
+            "stage",
+            np.array(samples.need["stages"]),
+            quantities.attrs("stage") | {"units": solver.stages.units},
+        ),
         "component": ("component", ["x", "y", "z"], quantities.attrs("component")),
         "m": ("m", waves, {"units": "1", "long_name": "azimuthal wavenumber"}),
         "k": ("k", waves, {"units": "1", "long_name": "colatitudinal wavenumber: cosine for even m, sine for odd m"}),

@@ -149,10 +149,10 @@ def agree(jobs: Sequence[Job]) -> None:
         MixedSamples: they do.
 
     """
-    _refuse_mixed("version", {job.version for job in jobs}, "Build with version=, or run the sweep again.")
+    _refuse_mixed("version", {job.version for job in jobs}, "Choose one with --version, or run the sweep again.")
     needs = [{name: value for name, value in job.need.items() if name not in _HARMLESS} for job in jobs]
     for name in needs[0]:
-        hint = "Build with quality=" if name == "quality" else "Build from one plan with plan="
+        hint = "Choose one with --quality" if name == "quality" else "Build from one plan with --plan"
         _refuse_mixed(name, {canonical(need.get(name)) for need in needs}, f"{hint}, or run the odd ones again.")
 
 

@@ -6,7 +6,7 @@ import os
 import sqlite3
 import threading
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 from .. import seal
@@ -26,7 +26,16 @@ _inherited: list[sqlite3.Connection] = []
 
 def readable(path: Path) -> str:
     """Return the address by which SQLite opens a file to read it only, whatever its name holds: `#`, `?`, `%`."""
-    return f"{path.absolute().as_uri()}?mode=ro"
+    address = f"{path.absolute().as_uri()}?mode=ro"
+    log = path.with_name(f"{path.name}-wal")
+    # without a log nobody has it open; to read it all the same SQLite would begin one, which it may not here
+    unused = not log.exists() or not log.stat().st_size
+    return f"{address}&immutable=1" if unused and _guarded(path) else address
+
+
+def _guarded(path: Path) -> bool:
+    """Return whether a file lies where we may not write beside it: another's directory, or a disk that is read only."""
+    return not os.access(path.parent, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
 
 
 def ask_the_system(path: Path) -> None:
@@ -79,6 +88,7 @@ class Database:
 
         Raises:
             CorruptLedger: the file is no database, or one of another version.
+            ReadOnlyStore: it may not be written, and is of an earlier version or in use.
             NetworkFileSystem: it is where locks do not hold.
             StorageFailed: the disk does not work, or another program keeps the file locked.
 
@@ -103,6 +113,10 @@ class Database:
     @contextmanager
     def _transaction(self, kind: str) -> Iterator[sqlite3.Connection]:
         with self._own_lock(), self._typed():
+            if kind == "DEFERRED" and self._connection is None and self._path.is_file() and _guarded(self._path):
+                with closing(self._look()) as connection:
+                    yield connection
+                return
             connection = self._connection or self._open()
             connection.execute(f"BEGIN {kind}")
             try:
@@ -120,6 +134,24 @@ class Database:
             self._pid, self._lock, self._connection = os.getpid(), threading.RLock(), None
         return self._lock
 
+    def _look(self) -> sqlite3.Connection:
+        """Return a connection for one look at a file that we may not change."""
+        refuse_network(self._path)
+        connection = sqlite3.connect(readable(self._path), uri=True, timeout=_PATIENCE, isolation_level=None)
+        try:
+            connection.row_factory = sqlite3.Row
+            connection.execute("BEGIN DEFERRED")
+            found = connection.execute("PRAGMA user_version").fetchone()[0]
+            if found > self._version:
+                raise self._newer(found)
+            if found < self._version:
+                said = f"{self._path} has version {found}, and cannot be written to make it {self._version}."
+                raise ReadOnlyStore(said, "Copy the store, and look at the copy.")
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
     def _open(self) -> sqlite3.Connection:
         refuse_network(self._path)
         self._path.parent.mkdir(parents=True, exist_ok=True)
@@ -131,11 +163,7 @@ class Database:
             connection.execute("BEGIN IMMEDIATE")
             found = connection.execute("PRAGMA user_version").fetchone()[0]
             if found > self._version:
-                raise CorruptLedger(
-                    f"{self._path} has version {found}, this program reads {self._version}.",
-                    "Install the wizen that wrote it; or restore a backup from before, or delete it (with its -wal "
-                    "and -shm files) and rebuild it from the shards: who asked for what is lost then.",
-                )
+                raise self._newer(found)
             changes = [self._upgrades[old] for old in range(found, self._version)] if found else []
             # what is there already stays: a table that a later program added appears in older files too
             for statement in ";".join([*changes, self._schema]).split(";"):
@@ -169,6 +197,13 @@ class Database:
             if name in ("SQLITE_NOTADB", "SQLITE_CORRUPT"):
                 raise self._unreadable(f"is not a sound database ({error})") from error
             raise
+
+    def _newer(self, found: int) -> CorruptLedger:
+        return CorruptLedger(
+            f"{self._path} has version {found}, this program reads {self._version}.",
+            "Install the wizen that wrote it; or restore a backup from before, or delete it (with its -wal "
+            "and -shm files) and rebuild it from the shards: who asked for what is lost then.",
+        )
 
     def _unreadable(self, why: str) -> CorruptLedger:
         return CorruptLedger(

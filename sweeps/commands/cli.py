@@ -115,7 +115,11 @@ def sweep(
     document = report_document(report) | {"store": str(store), "skipped": read.skipped, "repeated": read.repeated}
     document["parts"] = [report_document(r) for r in reports]
 
-    emit(document, as_json, lambda console: show_report(console, report, store, read))
+    own = {job.key for part in (read.first, read) if part is not None for job in part.jobs()}
+    # a name stands for all that was ever swept under it
+    source = str(plan) if plan.suffix == ".toml" else read.name
+    alone = all(key in own for key in iter(opened.keys()))
+    emit(document, as_json, lambda console: show_report(console, report, store, read, "" if alone else source))
     if any(r.stopped for r in reports):
         raise typer.Exit(130)
     if not all(r.complete for r in reports):
@@ -135,6 +139,8 @@ def status(store: StorePath, as_json: As_json = False) -> None:
     from store import scalars
     from store.store import Store
 
+    from .terminal.words import failed as told
+
     opened = Store.open(store)
     running, failed = opened.ledger.jobs("running"), opened.ledger.jobs("failed")
     counts = opened.ledger.counts()
@@ -153,8 +159,7 @@ def status(store: StorePath, as_json: As_json = False) -> None:
         for j in running:
             console.print(f"running {j.key[:12]} {j.progress:4.0%} {j.plan}", markup=False)
         for j in failed:
-            error = j.error or {}
-            console.print(f"failed  {j.key[:12]} {error.get('message')} {error.get('advice')}", markup=False)
+            console.print(f"failed  {told(j.key, j.plan, j.error or {}, store)}", markup=False)
         console.print(
             f"{document['results']} results, tables of shapes: {', '.join(shapes) or 'none'}, "
             f"of numbers: {', '.join(tabulated) or 'none'}",

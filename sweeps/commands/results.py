@@ -11,7 +11,7 @@ import typer
 
 from ..errors import InvalidOption
 from .terminal.console import emit, note
-from .terminal.options import As_json, StorePath
+from .terminal.options import As_json, StorePath, check_place
 
 if TYPE_CHECKING:
     from store.errors import CorruptShard
@@ -55,14 +55,19 @@ def results(
 
     wizen results --store demo --nc demo.nc
     """
+    from solver import registry
     from store.store import Store
 
     from .. import results as found
 
+    if nc is not None:
+        check_place("--nc", nc)
     damaged: dict[str, CorruptShard] = {}
     rows = found.find(Store.open(store), solver, where or (), sort, last, damaged)
     for error in damaged.values():
         note(f"left out: {error}")
+    if solver is not None and not rows:
+        registry.get(solver)  # results of a solver that is gone are still listed
     known = found.columns(rows)
     chosen = known if names is None else [name.strip() for name in names.split(",")]
     unknown = [name for name in chosen if rows and name not in known]
@@ -79,7 +84,9 @@ def results(
     else:
         listed = [{n: _plain(row.values[n]) for n in chosen if n in row.values} for row in rows]
         document = {"results": listed, "count": len(rows), "damaged": sorted(damaged)}
-        emit(document, as_json, lambda console: _show(console, rows, known, chosen if names is not None else None))
+        asked = found.named(where or (), sort)
+        told = chosen if names is not None else _telling(rows, [name for name in asked if name in known])
+        emit(document, as_json, lambda console: _show(console, rows, known, told))
     if damaged:
         raise typer.Exit(1)
 
@@ -89,8 +96,7 @@ def _plain(value: Any) -> Any:
     return None if value != value else value
 
 
-def _show(console: Any, rows: list[Row], known: list[str], chosen: list[str] | None) -> None:
-    columns = _telling(rows) if chosen is None else chosen
+def _show(console: Any, rows: list[Row], known: list[str], columns: list[str]) -> None:
     # not a grid, which cuts what does not fit: keys are there to be copied
     lines = [columns, *([_cell(name, row.values.get(name)) for name in columns] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
@@ -134,7 +140,8 @@ def show(
         "note": run.attrs.get("note"),
         "path": str(path),
         "bytes": path.stat().st_size,
-        "seconds": float(run["seconds"].sum()) if "seconds" in run else 0.0,
+        # each stage's are those spent up to it
+        "seconds": float(run["seconds"].max()) if "seconds" in run else 0.0,
         "stages": [float(stage) for stage in run["stage"]],
         "fields": {str(n): {"dims": list(v.dims), "shape": list(v.shape)} for n, v in run.data_vars.items()},
         "descriptors": per_stage(run),
@@ -145,18 +152,21 @@ def show(
         console.print("  ".join(f"{name}={short(value)}" for name, value in params.items()), markup=False)
         fields = [name for name, said in document["fields"].items() if len(said["dims"]) > 1]
         console.print(f"fields: {', '.join(fields) or 'none'}", markup=False)
-        show_run(console, document, str(run["stage"].attrs.get("long_name", "stage")))
+        show_run(console, document, str(run["stage"].attrs.get("symbol", "stage")))
 
     emit(document, as_json, shown)
 
 
-def _telling(rows: list[Row]) -> list[str]:
-    """Return the columns that tell the rows apart, and the first of their numbers."""
+def _telling(rows: list[Row], asked: list[str]) -> list[str]:
+    """Return the columns that tell the rows apart, those that were asked about, and the first of their numbers."""
     params = {name: {row.params.get(name) for row in rows} for row in rows for name in row.params}
     numbers = dict.fromkeys(name for row in rows for name in row.numbers)
     solvers = ["solver"] if len({row.solver for row in rows}) > 1 else []
     varying = [name for name, values in params.items() if len(values) > 1]
-    return ["key", *solvers, *varying, "stage", *list(numbers)[:_SHOWN]]
+    first = ["key", *solvers, *varying, "stage"]
+    about = [name for name in asked if name not in first]
+    left = [name for name in numbers if name not in about]
+    return [*first, *about, *left[: max(_SHOWN - len(about), 0)]]
 
 
 def _cell(name: str, value: Any) -> str:

@@ -85,8 +85,8 @@ class _Asked:
 def solve(asked: _Asked) -> None:
     """Run a solver once, here and now, without a store.
 
-    --out takes .h5 (the whole run, as a store keeps it), .npz, .png or .json, shapes as .obj or .glb, all stages as a
-    clip: .glb, .usda, .usdc, .usdz, and numbers by stage as a table, .csv, or drawn, .svg.
+    --out takes .h5 (netCDF-4: the whole run, as a store keeps it), .npz, .png or .json, shapes as .obj or .glb, all
+    stages as a clip: .glb, .usda, .usdc, .usdz, and numbers by stage as a table, .csv, or drawn, .svg.
 
     [bold]Examples[/bold]
 

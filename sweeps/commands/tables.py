@@ -12,7 +12,7 @@ from ..errors import InvalidOption
 from . import care as cli_tools
 from . import scoring
 from .terminal.console import emit, grid
-from .terminal.options import As_json, Quality, StorePath, StoreToRead, TableName
+from .terminal.options import As_json, Quality, StorePath, StoreToRead, TableName, check_place
 from .terminal.tables import open_store
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from store.store import Store
 
+    from ..planning.plan import Plan
 
 __all__ = ["add_to"]
 
@@ -42,6 +43,7 @@ def build(
         str | None, typer.Option("--plan", help="Only the results of this plan: its name, or its file.")
     ] = None,
     quality: Quality = None,
+    version: Annotated[str | None, typer.Option("--version", help="Only the results of this solver version.")] = None,
     resolution: Annotated[int | None, typer.Option("--resolution", min=4, help="Cut the spectra to this band.")] = None,
     precision: Annotated[
         Literal["int16", "float32", "float64"], typer.Option("--precision", help="As for `table rebuild`.")
@@ -66,18 +68,22 @@ def build(
     from store.store import Store
 
     opened = Store.open(store)
-    plan, text = _plan(opened, plan)
+    read, text = _plan(opened, plan)
+    if read is not None:
+        plan, solver = read.name, solver or read.solver.name
+    # what the file says now: what was swept under its name before may have been more
+    keys = tuple(job.key for job in read.jobs() if opened.has(job.key)) if read is not None else ()
     chosen = registry.get(solver or _only_solver(opened, plan))
     made = None
-    choice = Choice(plan, quality)
+    choice = Choice(plan, quality, version, keys or None)
     if chosen.surface is not None and finished(opened, chosen.name, choice, is_surface):
         told: dict[str, Any] = {"resolution": resolution, "text": text, "dtype": precision}
-        made = tables.build(opened, chosen, name, plan=plan, quality=quality, **told)
+        made = tables.build(opened, chosen, name, **choice._asdict(), **told)
     elif resolution is not None:
         raise InvalidOption("--resolution cuts shapes, and there are none.", "Leave it out.")
     numbers: dict[str, Any] | None = None
     try:
-        path = scalars.build(opened, chosen, name, choice._replace(keys=made.keys if made else None))
+        path = scalars.build(opened, chosen, name, choice._replace(keys=made.keys if made else choice.keys))
         numbers = _numbers(scalars.read(opened, name), path)
     except EmptyTable:
         if made is None:  # shapes alone, without a number beside them, are a table as well
@@ -114,8 +120,10 @@ def list_(
     from ..families import covered, gallery
 
     opened = open_store(store)
-    if picture is not None and picture.suffix.lower() != ".png":
-        raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
+    if picture is not None:
+        if picture.suffix.lower() != ".png":
+            raise InvalidOption(f"--picture {picture}: it is a picture.", "Name it .png.")
+        check_place("--picture", picture)
     found = []
     for name in opened.table_names():
         table = tables.info(opened, name)
@@ -240,14 +248,14 @@ def _show_numbers(console: Any, name: str, numbers: dict[str, Any]) -> None:
     console.print(numbers["path"], markup=False)
 
 
-def _plan(store: Store, plan: str | None) -> tuple[str | None, str]:
-    """Return a plan's name and its text, of its name or of its file."""
+def _plan(store: Store, plan: str | None) -> tuple[Plan | None, str]:
+    """Return the plan in a file, if it is one, and the text of that, or of the plan of that name."""
     if plan is None or not plan.endswith(".toml"):
-        return plan, store.plan(plan) if plan is not None else ""
+        return None, store.plan(plan) if plan is not None else ""
     from ..planning.plan import Plan
 
     path = Path(plan)
-    return Plan.load(path).name, path.read_text(encoding="utf-8")
+    return Plan.load(path), path.read_text(encoding="utf-8")
 
 
 def _show_table(table: Any, path: Path, as_json: bool, numbers: dict[str, Any] | None) -> None:

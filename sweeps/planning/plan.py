@@ -12,6 +12,7 @@ stages = [0.1, 0.2]
 from __future__ import annotations
 
 import itertools
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -81,14 +82,15 @@ class Plan:
         written = planfile.parse(tables)
         try:
             solver = registry.get(written.solver)
-            need = solver.settle(Need.parse(written.need).model_copy(update={"tolerance": None}), written.preset)
+            asked = Need.parse(_asked(written, solver))
+            need = solver.settle(asked.model_copy(update={"tolerance": None}), written.preset)
         except InvalidInput as error:
             raise PlanError(error.message, error.advice) from None
         _check_names(written, solver)
         samples, skipped, repeated = _samples(written, solver)
         try:
             # a tolerance holds for every sample
-            need = solver.settle(Need.parse(written.need), written.preset, samples.values())
+            need = solver.settle(asked, written.preset, samples.values())
         except InvalidInput as error:
             raise PlanError(f"[need]: {error.message}", error.advice) from None
         name = written.name or name
@@ -126,10 +128,37 @@ def job(solver: Solver, params: Params, need: Need) -> JobSpec:
     return JobSpec.of(solver, params, need)
 
 
+def _asked(written: PlanFile, solver: Solver) -> dict[str, Any]:
+    """Return what is needed, with the stages that come after `hours` under the conditions of `under`."""
+    need = dict(written.need)
+    hours, under = need.pop("hours", None), need.pop("under", None)
+    if hours is None:
+        if under is not None:
+            raise PlanError("[need]: under says how hours are spent, and there are none.", "Write hours = [24, 48].")
+        return need
+    if "stages" in need:
+        raise PlanError("[need]: hours and stages exclude each other.", "Keep one of them.")
+    if not isinstance(hours, list) or any(type(one) not in (int, float) for one in hours) or not hours:
+        raise PlanError(f"[need]: hours are numbers, not {hours!r}.", "Write hours = [24, 48].")
+    if under is not None and not isinstance(under, dict):
+        raise PlanError(f"[need]: under is a table, not {under!r}.", "Write under = {temperature = 60}.")
+    try:
+        return {**need, "stages": solver.stages_after(hours, under or {}, written.preset)}
+    except InvalidInput as error:
+        raise PlanError(f"[need]: {error.message}", solver.conditions_as(error.advice, _under)) from None
+
+
+def _under(conditions: Mapping[str, str]) -> str:
+    """Return conditions as a plan is told them."""
+    said = (f"{n} = {v if v.replace('.', '', 1).isdigit() else json.dumps(v)}" for n, v in conditions.items())
+    return f"under = {{{', '.join(said)}}}"
+
+
 def _samples(written: PlanFile, solver: Solver) -> tuple[dict[str, Params], int, int]:
     """Return the samples by what they say, how many were impossible and skipped, and how many said the same again."""
     samples: dict[str, Params] = {}
     skipped = repeated = tried = 0
+    why: InvalidGeometry | None = None
     wanted = written.sampling.count if written.sampling.skip_invalid else None
     for values in points(written):
         tried += 1
@@ -139,7 +168,7 @@ def _samples(written: PlanFile, solver: Solver) -> tuple[dict[str, Params], int,
             if not written.sampling.skip_invalid:
                 advice = f"{error.advice} Change it, or set skip_invalid = true under [sampling]."
                 raise PlanError(f"sample {_show(values)}: {error.message}", advice.strip()) from None
-            skipped += 1
+            skipped, why = skipped + 1, error
         except InvalidInput as error:
             where = f"sample {_show(values)}: " if values else ""
             raise PlanError(f"{where}{error.message}", error.advice) from None
@@ -153,7 +182,9 @@ def _samples(written: PlanFile, solver: Solver) -> tuple[dict[str, Params], int,
             "Change the ranges under [axes], or ask for fewer.",
         )
     if not samples:
-        raise PlanError(f"none of the {skipped} combinations is possible.", "Change the ranges under [axes].")
+        assert why is not None  # there is a point at least
+        said = f"none of the {skipped} combinations is possible; of the last, {why.message}"
+        raise PlanError(said, f"{why.advice} Or change the ranges under [axes].".lstrip())
     return samples, skipped, repeated
 
 

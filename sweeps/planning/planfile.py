@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Discriminator, Field, Strict, Tag, ValidationError, model_validator
 
 from ..errors import PlanError
 
@@ -42,7 +42,7 @@ def _tag(value: Any) -> str:
 
 #: The values of one swept name. The tags keep a wrong list from being reported as a wrong range as well.
 Axis = Annotated[
-    Annotated[Range, Tag("range")] | Annotated[tuple[float, ...], Tag("list")],
+    Annotated[Range, Tag("range")] | Annotated[tuple[Annotated[float, Strict()], ...], Tag("list")],
     Discriminator(_tag),
 ]
 
@@ -159,6 +159,11 @@ def _findings(error: ValidationError) -> Iterable[str]:
             yield f"unknown name {where!r}: {suggest(place[-1], _names(table)).rstrip('.')}"
         elif place[:1] == ["axes"] and item["type"] == "tuple_type":
             yield f"{where}: a list of numbers, or {{from = 0.01, to = 0.04, count = 4}} (got {item['input']!r})"
+        elif place[:1] == ["axes"] and item["type"] == "float_type":
+            listed = '[[samples]], with kind = "list" under [sampling]'
+            yield f"axes.{place[1]}: an axis is of numbers; words and lists may stand in {listed}"
+        elif place == ["solver"] and item["type"] == "missing":
+            yield 'no solver is named: begin with a line such as solver = "dehydration"'
         else:
             yield f"{where + ': ' if where else ''}{item['msg'].removeprefix('Value error, ')}"
 

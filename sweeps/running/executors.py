@@ -277,8 +277,11 @@ def _need_dask() -> None:
 @contextmanager
 def _client(where: Any) -> Iterator[Any]:
     from distributed import Client
+    from distributed.comm.addressing import get_address_host_port
 
     try:
+        if isinstance(where, str):
+            get_address_host_port(where)  # a client that finds it is no address waits for itself when it is let go
         client = Client(where, timeout=_PATIENCE, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         advice = "Start one with `dask scheduler`, and name it as in tcp://10.0.0.1:8786."

@@ -95,8 +95,8 @@ def test_all_seeds_of_a_table_are_in_it() -> None:
     table = documents.table(figures.load("dehydration-buckled"), "whole")
     record = figures.load("dehydration-buckled")
     runs = [run for run in record["runs"] if not run["mirrors"] and run["version"] == record["version"]]
-    shown = re.findall(r"^\| (\w+, \d+) \|", table, re.MULTILINE)
-    assert sorted(shown) == sorted(f"{run['quality']}, {run['seed']}" for run in runs)
+    shown = re.findall(r"^\| ([\d.]+ \| \w+, \d+) \|", table, re.MULTILINE)
+    assert sorted(shown) == sorted(f"{run['gamma']:g} | {run['quality']}, {run['seed']}" for run in runs)
     assert len(runs) >= 6
 
 

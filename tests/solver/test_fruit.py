@@ -84,6 +84,7 @@ def test_lattice_avoids_the_poles_and_closes_in_azimuth():
         ({"tee": 0.04}, InvalidInput, "did you mean 'te'"),
         ({"radii": [2.0] + [1.0] * 7}, InvalidInput, "divide every length by r1"),
         ({"radii": [1.0] * 7}, InvalidInput, r"radii needs 8 values, such as \[1.0, 1.0, "),
+        ({"radii": [1.0] * 2}, InvalidInput, r"^radii: radii needs 8 values, [^;]*$"),
         ({"radii": [1.0] * 9}, InvalidInput, "radii needs 8 values"),
         ({"stone": 0.4}, InvalidInput, r"stone: stone needs 2 values, such as \[0.4, 0.4\] \(got 0.4"),
         ({"r1": 2.0}, InvalidInput, "'r1' cannot be set. It is the unit of length"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -51,6 +52,13 @@ def test_every_unit_that_leaves_is_one_that_others_read() -> None:
         said |= {*solver.axis_units().values(), solver.stages.units}
     assert {unit_attrs(unit)["units"] for unit in said} <= KNOWN
     assert unit_attrs("1/r1") == {"units": "1", "normalised_by": "1/r1"}
+
+
+def test_the_stages_of_a_table_have_their_solver_s_unit(filled: Store) -> None:
+    """Days, of what rots."""
+    tables.build(filled, replace(SOLVER, stages=SOLVER.stages._replace(units="day")))
+    with tables.open(filled) as opened:
+        assert opened["stage"].attrs["units"] == "day"
 
 
 def files(store: Store) -> list[Path]:

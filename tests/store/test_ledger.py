@@ -1,8 +1,10 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import pickle
 import sqlite3
+import tempfile
 import threading
 import time
 from collections.abc import Iterator
@@ -12,7 +14,7 @@ from pathlib import Path
 import pytest
 import xarray as xr
 
-from store.errors import CorruptLedger, QuotaSpent, StorageFailed, UnknownJob
+from store.errors import CorruptLedger, QuotaSpent, ReadOnlyStore, StorageFailed, UnknownJob
 from store.ledger import clock, database, jobs
 from store.ledger.asks import Asker, Spending, asks
 from store.ledger.clock import Clock
@@ -34,6 +36,44 @@ def claim(ledger: Ledger, lease: float = 60.0, worker: str = "w") -> Job:
     found = ledger.claim(worker, lease)
     assert found is not None
     return found
+
+
+@contextlib.contextmanager
+def as_another(directory: Path) -> Iterator[None]:
+    """Be, for a while, somebody who may not write in a directory."""
+    root, mode = os.geteuid() == 0, directory.stat().st_mode
+    directory.chmod(0o555)
+    if root:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if root:
+            os.seteuid(0)
+        directory.chmod(mode)
+
+
+def test_a_ledger_that_may_not_be_written_is_read() -> None:
+    """Another's, or on a disk that is read only; SQLite by itself would begin a log beside it."""
+    with tempfile.TemporaryDirectory() as name:
+        ledger = Ledger(Path(name, "ledger.sqlite"))
+        ledger.want([job("a"), job("b")], plan="p")
+        claimed = claim(ledger)
+        assert ledger.done(claimed, "digest", 1.0)
+        ledger.close()
+        with as_another(Path(name)):
+            assert ledger.counts()["done"] == 1
+            assert [found.key for found in ledger.jobs("wanted")] == ["b"]
+            with pytest.raises(ReadOnlyStore, match="cannot be written"):
+                ledger.want([job("c")])
+            assert [path.name for path in Path(name).iterdir()] == ["ledger.sqlite"]
+        assert ledger.want([job("c")]) == 1
+        assert ledger.counts()["wanted"] == 2
+        ledger.database.close()
+        with contextlib.closing(sqlite3.connect(ledger.path)) as connection:
+            connection.execute("PRAGMA user_version = 1")
+        with as_another(Path(name)), pytest.raises(ReadOnlyStore, match="Copy the store"):
+            ledger.counts()
 
 
 @pytest.fixture

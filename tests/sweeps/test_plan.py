@@ -66,6 +66,40 @@ def test_what_contradicts_itself_is_refused(tables: dict[str, Any], said: str) -
     assert said in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "values",
+    [["xyz", "xy"], [[0, 0, 1], [0, 0, 2]], [True, False], ["0.04", "0.05"]],
+    ids=["words", "lists", "truth", "text"],
+)
+def test_axes_are_of_numbers(values: list[Any]) -> None:
+    with pytest.raises(PlanError, match=r"axes.te: an axis is of numbers; .*\[\[samples\]\]") as caught:
+        plan(axes={"te": values})
+    assert str(caught.value).count("axes.te") == 1
+
+
+def test_hours_are_the_stages_that_they_come_to() -> None:
+    """As of `wizen solve --hours`; an error is in the words of a plan."""
+    solver, page = registry.get("dehydration"), {"kinetics": "page", "rate": 0.1, "exponent": 1, "moisture": 0.8}
+    read = plan(need={"hours": [5, 10], "under": page})
+    assert read.need.stages == solver.stages_after([5, 10], page, "sphere")
+    assert read.jobs()[0].key == plan(need={"stages": list(read.need.stages)}).jobs()[0].key
+    for need, said in (
+        ({"hours": [5]}, r"under = \{kinetics = \"grape\"\}"),
+        ({"hours": [5], "under": {"kinetics": "jujube"}}, r"under = \{temperature = 60, air_speed = 1"),
+        ({"hours": [5], "stages": [0.1]}, "exclude each other"),
+        ({"under": page}, "there are none"),
+        ({"hours": 5}, r"hours = \[24, 48\]"),
+        ({"hours": [5], "under": 3}, "under is a table"),
+    ):
+        with pytest.raises(PlanError, match=said):
+            plan(need=need)
+
+
+def test_an_empty_plan_says_how_to_begin() -> None:
+    with pytest.raises(PlanError, match='begin with a line such as solver = "dehydration"'):
+        Plan.parse({})
+
+
 PATTERN = {"sample": {"te": 0.03}, "stage": 0.1, "controls": [{"te": 0.02}]}
 
 
@@ -161,8 +195,12 @@ def test_impossible_samples_are_skipped_only_when_told() -> None:
     with pytest.raises(PlanError, match=r"rs1 = 0.99, te = 0.03: the stone .* skip_invalid"):
         plan(axes=axes)
     assert plan(axes=axes, sampling={"skip_invalid": True}).skipped == 2
-    with pytest.raises(PlanError, match="none of the 1 combinations"):
+    with pytest.raises(PlanError, match=r"none of the 1 combinations .* too little flesh"):
         plan(axes={"rs1": [0.99]}, sampling={"skip_invalid": True})
+    # no range would help
+    free = {"axes": {"r2": [0.8, 0.9]}, "set": {"mirrors": "xyz"}, "sampling": {"skip_invalid": True}}
+    with pytest.raises(PlanError, match=r"none of the 2 .* leave y out of mirrors"):
+        plan(**free)
 
 
 @pytest.mark.parametrize(("low", "high", "waste"), [(0.6, 1.2, 0.7), (0.7, 1.1, 0.2)])
@@ -215,7 +253,7 @@ def test_the_need_is_settled() -> None:
         ({"axes": {"te": {"from": 0.01, "to": 0.02, "count": 10**9}}}, "samples, more than"),
         ({"axes": {"te": []}}, "no values"),
         ({"axes": {"te": "thin"}}, "a list of numbers, or"),
-        ({"axes": {"te": ["thin"]}}, "axes.te.0"),
+        ({"axes": {"te": ["thin"]}}, "axes.te: an axis is of numbers"),
         ({"axes": {"te": [float("nan")]}}, "axes.te.0"),
         ({"axes": {"te": [0.02]}, "set": {"exocarp_thickness": 0.03}}, "under .set. and under .axes."),
         ({"axes": {"te": [0.02], "exocarp_thickness": [0.03]}}, "same parameter"),

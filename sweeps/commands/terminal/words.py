@@ -12,7 +12,7 @@ from ...planning.plan import Plan
 from ...running.report import Report
 from .console import grid
 
-__all__ = ["per_stage", "readers", "report_document", "short", "show_report", "show_run"]
+__all__ = ["failed", "per_stage", "readers", "report_document", "short", "show_report", "show_run"]
 
 
 def short(value: Any) -> str:
@@ -72,11 +72,21 @@ def report_document(report: Report) -> dict[str, Any]:
     return asdict(report) | {"complete": report.complete}
 
 
-def show_report(console: Any, report: Report, store: Path, plan: Plan) -> None:
-    """Print what a sweep achieved, and what to do next: a table of its shapes, where they are ones to interpolate."""
+def failed(key: str, which: str, error: Mapping[str, Any], store: Path) -> str:
+    """Return what became of a job that was given up, and where the stages are that it settled before."""
+    kept = f"Stages settled before: {store / error['partial']}" if error.get("partial") else ""
+    said = " ".join(filter(None, (error.get("message"), error.get("advice"), kept)))
+    return f"{key[:12]}{f' ({which})' if which else ''}: {said}"
+
+
+def show_report(console: Any, report: Report, store: Path, plan: Plan, source: str = "") -> None:
+    """Print what a sweep achieved, and what to do next: a table of its shapes, where they are ones to interpolate.
+
+    source: what `--plan` is told where the store holds more than the plan's results.
+    """
     for failure in report.failed:
-        error = failure.error
-        console.print(f"failed {failure.key[:12]}: {error.get('message')} {error.get('advice', '')}", markup=False)
+        which = " ".join(f"{name}={read(failure.params)}" for name, read in readers(plan).items())
+        console.print(f"failed {failed(failure.key, which, failure.error, store)}", markup=False)
     parts = [f"{report.solved} solved", f"{report.reused} stored before"]
     parts += [
         f"{count} {word}"
@@ -89,7 +99,7 @@ def show_report(console: Any, report: Report, store: Path, plan: Plan) -> None:
     ]
     console.print(f"{report.plan}: {', '.join(parts)} of {report.total}, in {report.seconds:.1f} s")
     if report.complete:
-        only = f" --plan {shlex.quote(plan.name)}" if plan.controls else ""
+        only = f" --plan {shlex.quote(source)}" if source else ""
         console.print(f"next: wizen table build --store {shlex.quote(str(store))}{only}", markup=False)
     elif report.solved or report.reused:
         console.print(
