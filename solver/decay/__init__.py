@@ -34,7 +34,7 @@ def _cost(params: DecayParams, need: Need) -> Cost:
 
 SOLVER = Solver(
     name="decay",
-    version="10",
+    version="11",
     title="Decay of fruits: rot and mould",
     params=DecayParams,
     fields=ALL,

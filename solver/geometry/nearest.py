@@ -59,7 +59,8 @@ def _away(p: Floats, low: Floats, high: Floats) -> float:
     return total
 
 
-@njit(cache=True, error_model="numpy")
+# without the GIL: a fine mesh takes 16 s, and a watchdog ends what was told to stop
+@njit(cache=True, error_model="numpy", nogil=True)
 def _descend(
     points: Floats,
     corners: Floats,

@@ -57,7 +57,7 @@ def _extent(params: GrowthParams) -> Extent:
 
 SOLVER = Solver(
     name="growth",
-    version="11",
+    version="12",
     title="Growth of thin shells",
     params=GrowthParams,
     fields=("mesh_position", "elastic_strain", "sheet_thickness", *CHANNELS, "mesh_area", "stored_energy", "rest_area"),

@@ -147,7 +147,7 @@ class Steps:
         drift = (point.x - state.x) / dt if dt else None
         if energy.pushed is not None:
             state = replace(state, matter=state.matter | {"pushed": energy.pushed})
-        state = replace(state, x=point.x, forces=forces, iterations=state.iterations + spent - 1, drift=drift)
+        state = replace(state, x=point.x, forces=forces, iterations=state.iterations + max(spent - 1, 0), drift=drift)
         # where rounding ends the search, more may be left than was asked for
         check_held(energy, state, max(goal, point.gradient), before.time)
         check_outward(state, self.volume, before.time, p)

@@ -86,7 +86,7 @@ _STRESSES = ("rod_strain", "rod_stress", "rod_crushed", "bond_position", "bond_t
 
 SOLVER = Solver(
     name="wood",
-    version="13",
+    version="14",
     title="Wood: bonded rods and splinters",
     params=WoodParams,
     fields=("rod_cut", *_NUMBERS, "rod_position", "mesh_position", "inside", "body", *_STRESSES),

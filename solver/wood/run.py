@@ -97,7 +97,7 @@ def _run(
         contact = float(law(wood, params)[1]) if params.touching else 0.0
         longest = longest_step(wood, contact)
         dt = min(shorter * settings.courant * longest, params.step or np.inf)
-        few_enough(dt, need.stages[-1])
+        few_enough(dt, need.stages[-1], params.step)
         slow_enough(params, dt, params.length / (settings.vertices - 1))
         wood = touchable(wood, dt, contact)
         attrs |= {"step": dt, "longest_stable_step": longest}

@@ -69,4 +69,5 @@ def expected_cost(params: WoodParams, need: Need) -> Cost:
     # the stretch waves of the mean edge bound the step within a factor of two
     speed = (params.stiffness / params.density) ** 0.5
     step = settings.courant * 0.3 * params.length / settings.vertices / speed * params.mass_scaling**0.5
+    step = min(step, params.step or math.inf)
     return Cost(1.0 + need.stages[-1] / step * count * _EXPLICIT, count * _BYTES + fixed)

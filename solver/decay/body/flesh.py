@@ -14,7 +14,11 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from ...arrays import Bools, Floats
 
-__all__ = ["Booked", "Flesh", "Skin", "Softened", "Swing", "softened"]
+__all__ = ["SHORTEST", "Booked", "Flesh", "Skin", "Softened", "Swing", "softened"]
+
+
+#: The shortest step of springs [s].
+SHORTEST = 1e-6
 
 
 class Flesh(BaseModel):
@@ -81,7 +85,7 @@ class Swing(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    step: float = Field(0.006, ge=1e-6, le=1, description="Step of RK4 [s]")
+    step: float = Field(0.006, ge=SHORTEST, le=1, description="Step of RK4 [s]")
     seconds: float = Field(1.0, ge=0, le=100, description="How long the springs swing before a stage is shown [s]")
     damping: float = Field(20.0, ge=0, le=1000, description="Damping of all motion [1/s]")
 

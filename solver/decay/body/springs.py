@@ -8,6 +8,7 @@ steps below sqrt(8) / w; the stiffest one is known before the first step. Nothin
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import combinations
@@ -20,11 +21,11 @@ from scipy.sparse.linalg import eigsh
 from ...arrays import Floats, Ints
 from ...contract import Unstable
 from .equilibrium import Balance
-from .flesh import Softened, Swing
+from .flesh import SHORTEST, Softened, Swing
 from .loads import Loads, pushes
 from .solid import Solid, volumes
 
-__all__ = ["Network", "knit", "longest_step", "swing", "swung"]
+__all__ = ["Network", "knit", "longest_step", "slower", "swing", "swung"]
 
 
 #: RK4 is stable on the imaginary axis up to this.
@@ -85,6 +86,14 @@ def longest_step(x: Floats, network: Network, loads: Loads) -> float:
     return float(_LIMIT / np.sqrt(largest[0]))
 
 
+def slower(rule: Swing, limit: float) -> str:
+    """Return what to set where steps are too long, as it can be typed; limit: the longest step [s]."""
+    # two digits: one might be rounded up to beyond the limit
+    step, softer = float(f"{0.9 * limit:.2g}"), math.ceil(1.2 * (rule.step / limit) ** 2)
+    ways = [f'swing={{"step":{step:g}}}'] if step >= SHORTEST else []
+    return f"Set {' or '.join([*ways, 'body=quasi-static'])}, or give flesh a unit {softer} times as small."
+
+
 def swung(
     solid: Solid,
     start: Floats,
@@ -103,7 +112,7 @@ def swung(
     if rule.step > limit:
         raise Unstable(
             f"steps of {rule.step:.2g} s are longer than {limit:.2g} s, the longest that are stable for this body.",
-            advice=f"Set swing.step to {0.9 * limit:.1g}, make the flesh softer (flesh.unit), or body=quasi-static.",
+            advice=slower(rule, limit),
         )
     x, v = start.copy(), np.zeros_like(start)
     left = steps = max(1, round(rule.seconds / rule.step))
@@ -113,7 +122,7 @@ def swung(
         swing(x, v, network, loads, rule.step, rule.damping, batch)
         left -= batch
         if not np.isfinite(x).all():
-            raise Unstable("the springs blew up.", advice="Take a shorter swing.step, or body=quasi-static.")
+            raise Unstable("the springs blew up.", advice=slower(rule, rule.step / 2))
     pull, size = np.zeros_like(x), np.zeros(len(x))
     up = _pull(x, *_arrays(network, loads), pull, size)
     residual = float(np.linalg.norm(pull)) / max(float(np.linalg.norm(size)), 1e-300)

@@ -88,7 +88,9 @@ def joined(
         raise InvalidGeometry(
             "the outermost flesh is thicker than what is left below it.", advice="Take a smaller within.skin."
         )
-    shrunk, outside, above = np.cbrt(less), boundary(tets), len(surface.points)
+    # of all there is: flesh ends below the skin, and at its core as well, which no skin lies over
+    outside, above = boundary(cells), len(surface.points)
+    shrunk, outside = np.cbrt(less), outside[(outside < len(flesh)).all(axis=1)]
     over, under, share = _met(surface.points, flesh, outside)
     rows = np.repeat(np.arange(above), np.diff(surface.start))
     keep = rows < surface.near

@@ -17,14 +17,19 @@ __all__ = ["few_enough", "slow_enough"]
 _MOST = 1e10
 
 
-def few_enough(dt: float, last: float) -> None:
-    """Refuse what would never come to its last stage, at `last` [s], in steps of dt [s].
+def few_enough(dt: float, last: float, asked: float | None = None) -> None:
+    """Refuse what would never come to its last stage, at `last` [s], in steps of dt [s]; asked: the step asked for.
 
     Raises:
         InvalidInput: see above.
 
     """
     if last > _MOST * dt:
+        if asked == dt:
+            raise InvalidInput(
+                f"steps of {dt:.2g} s are too many up to the last stage, at {last:g} s.",
+                advice=f"Leave step out, give {last / _MOST:.2g} or more, or ask for earlier stages.",
+            )
         raise InvalidInput(
             f"no steps longer than {dt:.2g} s are stable, and the last stage is at {last:g} s.",
             advice="Ask for earlier stages, or give heavier bodies, a lower contact_stiffness, or thicker rods.",

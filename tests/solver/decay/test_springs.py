@@ -1,14 +1,17 @@
 """The paper's mass-spring body: its longest step, its stiffness, and where it settles."""
 
+import json
+import re
+
 import numpy as np
 import pytest
 
 from solver.contract import Context, Need, Unstable
 from solver.decay import SOLVER
-from solver.decay.body.flesh import Softened
+from solver.decay.body.flesh import Softened, Swing
 from solver.decay.body.loads import Loads
 from solver.decay.body.solid import fill
-from solver.decay.body.springs import Network, knit, longest_step, swing
+from solver.decay.body.springs import Network, knit, longest_step, slower, swing
 from solver.fruit import Fruit
 
 
@@ -56,7 +59,21 @@ def test_steps_of_the_paper_are_refused_for_an_apple_and_told_what_would_do():
     need = Need(fields=("volume",), stages=(1.0,), quality="preview")
     with pytest.raises(Unstable, match="longest") as caught:
         SOLVER.solve(SOLVER.parse({"body": "paper", "wounds": ()}, "apple"), need)
-    assert "swing.step" in caught.value.advice
+    # what it says can be typed as it stands, and does
+    (swing_said,) = re.findall(r"swing=(\{.*?\})", caught.value.advice)
+    (softer,) = re.findall(r"unit (\d+) times", caught.value.advice)
+    short = json.loads(swing_said) | {"seconds": 0.001}
+    for values in ({"swing": short}, {"flesh": {"unit": 1e4 / int(softer)}, "swing": {"seconds": 0.006}}):
+        assert SOLVER.solve(SOLVER.parse({"body": "paper", "wounds": (), **values}, "apple"), need).volume.size == 1
+
+
+@pytest.mark.parametrize("limit", [1.7e-5, 9.6e-5, 1e-6, 1e-9])
+def test_a_step_that_is_advised_is_stable_and_allowed(limit):
+    """One digit would round 1.53e-5 up to 2e-5, which is too long again."""
+    said = re.findall(r"swing=(\{.*?\})", slower(Swing(), limit))
+    steps = [Swing(**json.loads(one)).step for one in said]
+    assert len(steps) == (limit > 1.2e-6)
+    assert all(step < limit for step in steps)
 
 
 def test_soft_springs_settle_to_the_share_that_eq_1_leaves():

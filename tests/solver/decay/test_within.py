@@ -351,3 +351,15 @@ def test_a_heap_and_a_mesh_too_thin_are_refused():
         DecayParams.parse({"within": {}, "heap": {}})
     with pytest.raises(InvalidGeometry, match="thin"):
         joined(triangulated(*shell_of_box(1.0, 0.002)), 300, 0.0005)
+
+
+def test_the_skin_is_joined_to_what_lies_below_it_alone():
+    """Flesh ends at a core as well: a link from there to the skin would lead rot and water past all that is between."""
+    params = SOLVER.parse({"within": {}, "body": "quasi-static"}, preset="apple")
+    joint = System(params, 16, False, None, 4000).joint
+    assert joint is not None
+    skin = len(joint.cover.points)
+    row = np.repeat(np.arange(len(joint.points)), np.diff(joint.start))
+    across = (row < skin) & (joint.near >= skin)
+    far = np.linalg.norm(joint.points[row[across]] - joint.points[joint.near[across]], axis=1)
+    assert far.max() < 0.2

@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import simpson, solve_bvp
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from solver.contract import Context, Need
+from solver.contract import Context, Need, NotConverged
 from solver.wood import SOLVER
 from solver.wood.forces.hessian import Stiffness
 from solver.wood.model.bundle import lay
@@ -172,6 +173,41 @@ def test_euler_s_load():
 
     critical = np.pi**2 * E * SECOND / (4 * L**2)
     assert brentq(softest, 0.9 * critical, 1.1 * critical, xtol=1e-4 * critical) == pytest.approx(critical, rel=3e-3)
+
+
+@pytest.mark.parametrize("rods", [1, 7])
+def test_what_has_buckled_is_no_equilibrium(rods):
+    """Beyond Euler's load what is straight balances, or leans against the load, and would not last."""
+    critical = np.pi**2 * E * SECOND / (4 * L**2)
+    slender = {"length": L, "radius": R, "rods": rods, "vertices": 12, "mode": "static", **PLAIN}
+
+    def pressed(load: float, across: float) -> xr.Dataset:
+        params = SOLVER.parse({**slender, "tip_load": (-load * critical, 0.0, across)})
+        return SOLVER.solve(params, Need(stages=(0.5, 1.0), quality="preview", fields=("tip_position",)))
+
+    assert pressed(0.9, -1e-3 * critical).converged.all()
+    for across in (0.0, -1e-4 * critical):
+        with pytest.raises(NotConverged, match="buckled") as caught:
+            pressed(1.3, across)
+        assert caught.value.last_stage == 0.5
+        assert caught.value.partial is not None
+        assert caught.value.partial.converged.all()
+
+
+def test_what_is_slender_bends_under_loads_that_are_nothing_to_its_strength():
+    """F L^3 / 3 E I at 10,000 radii, under a billionth of what it bears; it stayed where it was."""
+    radius, length = 1e-3, 10.0
+    second = np.pi * radius**4 / 4
+    load = 3 * E * second * 1e-3 / length**2
+    values = {"length": length, "radius": radius, "rods": 1, "vertices": 40, "mode": "static", **PLAIN}
+    params = SOLVER.parse({**values, "tip_load": (0.0, 0.0, -load)})
+    found = SOLVER.solve(params, Need(stages=(1.0,), quality="preview", fields=("tip_position",)))
+    assert found.converged.all()
+    assert -found.tip_position.values[0, 2] == pytest.approx(1e-3 * length, rel=0.01)
+    # further than numbers tell
+    thin = SOLVER.parse({**values, "radius": 1e-4, "tip_load": (0.0, 0.0, -load * 1e-4)})
+    with pytest.raises(NotConverged, match="so slender"):
+        SOLVER.solve(thin, Need(stages=(1.0,), quality="preview", fields=("tip_position",)))
 
 
 def test_torsion_swings_with_its_wave():

@@ -201,6 +201,17 @@ def test_steps_without_end_are_refused() -> None:
         assert "heavier bodies" in caught.value.advice
 
 
+def test_steps_that_were_asked_for_count() -> None:
+    """A step a million times too short is dear, and where it never ends it is the step that is named."""
+    need = Need(stages=(0.01,), quality="preview")
+    usual, short = SOLVER.parse(FINE), SOLVER.parse({**FINE, "step": 1e-9})
+    assert SOLVER.cost(short, need).seconds > 100 * SOLVER.cost(usual, need).seconds
+    assert SOLVER.cost(SOLVER.parse({**FINE, "step": 1.0}), need) == SOLVER.cost(usual, need)
+    with pytest.raises(InvalidInput, match="steps of 1e-14 s are too many") as caught:
+        SOLVER.solve(SOLVER.parse({**FINE, "step": 1e-14}), need)
+    assert "Leave step out, give 1e-12 or more" in caught.value.advice
+
+
 def test_a_run_that_blows_up_names_what_is_there() -> None:
     """A load that no rod bears was told of a contact where nothing touched."""
     values = {**FINE, "tip_load": (0, 0, -1e7)}
