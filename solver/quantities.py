@@ -6,9 +6,13 @@ units of the sarcocarp's shear modulus. Units follow UDUNITS, so that CF readers
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
-__all__ = ["QUANTITIES", "Quantity", "attrs", "register", "unit_attrs"]
+__all__ = ["QUANTITIES", "Quantity", "attrs", "in_words", "register", "unit_attrs"]
+
+#: Tenths of a logarithm to the base of ten, as UDUNITS reads them.
+_DECIBELS = "0.1 lg(re 1)"
 
 
 class Quantity(NamedTuple):
@@ -57,10 +61,16 @@ def unit_attrs(units: str) -> dict[str, str]:
     a logarithm to the base of ten.
     """
     if units == "dB":
-        return {"units": "0.1 lg(re 1)"}
+        return {"units": _DECIBELS}
     if "r1" in units or "shape's unit" in units:
         return {"units": "1", "normalised_by": units}
     return {"units": units}
+
+
+def in_words(attrs: Mapping[str, Any]) -> str:
+    """Return the unit that netCDF attributes say, as people write it: the other way round from `unit_attrs`."""
+    said = str(attrs.get("normalised_by", attrs.get("units", "")))
+    return "dB" if said == _DECIBELS else said
 
 
 # axes and convergence data that every solver shares

@@ -131,7 +131,8 @@ def _hint(fields: Mapping[str, Any], place: Place) -> str:
     group, _, inner = name.partition(".")
     if alone and inner and (there := _within(fields, (group, inner))):
         # errors name what is in a group so, but nothing can be set so
-        return f"; {group} is one value, an object of {', '.join(there)}"
+        typed = f"{group}={{{json.dumps(inner)}: ...}}" if inner in there else f"{group}={{...}}"
+        return f"; {group} is one value, {typed}, an object of {', '.join(there)}"
     within = list(fields) if alone else _within(fields, place)
     near = difflib.get_close_matches(name, within, n=1)
     if near:

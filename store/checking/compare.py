@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
+from solver import quantities
 from solver.arrays import Array
 
 from .. import seal
@@ -184,7 +185,6 @@ def _descriptors(
         values, others = left[name].values.astype(float), right[name].values.astype(float)
         for stage, i, j in stages:
             apart = np.array([others[q, j] - values[p, i] for p, q in pairs])
-            units = str(left[name].attrs.get("units", ""))
             rms, most = float(np.sqrt((apart**2).mean())), float(np.abs(apart).max())
-            rows.append(Difference(name, stage, rms, most, units))
+            rows.append(Difference(name, stage, rms, most, quantities.in_words(left[name].attrs)))
     return rows

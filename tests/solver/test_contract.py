@@ -369,7 +369,7 @@ def test_unknown_solver_and_preset_get_a_hint():
 
 def test_a_path_into_a_group_is_no_name_and_gets_a_hint():
     wood = registry.get("wood")
-    with pytest.raises(InvalidInput, match=r"'grain\.spiral'; grain is one value, an object of .*spiral") as found:
+    with pytest.raises(InvalidInput, match=r"grain is one value, grain={\"spiral\": ...}, an object of") as found:
         wood.parse({"grain.spiral": 1.0})
     assert "known:" not in str(found.value)
     with pytest.raises(InvalidInput, match=r"'rods\.spiral'; known: "):

@@ -13,7 +13,7 @@ import xarray as xr
 
 from solver import registry
 from solver.dehydration import SOLVER
-from solver.quantities import QUANTITIES, unit_attrs
+from solver.quantities import QUANTITIES, in_words, unit_attrs
 from store import scalars, tables
 from store.store import Store
 from store.surfaces.measures import UNITS
@@ -52,6 +52,7 @@ def test_every_unit_that_leaves_is_one_that_others_read() -> None:
         said |= {*solver.axis_units().values(), solver.stages.units}
     assert {unit_attrs(unit)["units"] for unit in said} <= KNOWN
     assert unit_attrs("1/r1") == {"units": "1", "normalised_by": "1/r1"}
+    assert {in_words(unit_attrs(unit)) for unit in said} == said
 
 
 def test_the_stages_of_a_table_have_their_solver_s_unit(filled: Store) -> None:
