@@ -15,7 +15,7 @@ from store.starter import ROOT
 from store.surfaces.window import Window
 
 #: Questions to the table in the package whose blends cross themselves.
-ASKED = ({"te": 0.0385, "gamma": 34.2}, {"te": 0.0323, "gamma": 43.6})
+ASKED = ({"te": 0.0385, "gamma": 34.2}, {"te": 0.0386, "gamma": 11.3})
 
 
 @pytest.fixture(scope="module")
