@@ -88,10 +88,9 @@ def joined(
         raise InvalidGeometry(
             "the outermost flesh is thicker than what is left below it.", advice="Take a smaller within.skin."
         )
-    # of all there is: flesh ends below the skin, and at its core as well, which no skin lies over
+    # where all that there is ends: no skin lies over what the flesh has at its core
     outside, above = boundary(cells), len(surface.points)
-    shrunk, outside = np.cbrt(less), outside[(outside < len(flesh)).all(axis=1)]
-    over, under, share = _met(surface.points, flesh, outside)
+    over, under, share = _met(surface.points, flesh, outside[(outside < len(flesh)).all(axis=1)])
     rows = np.repeat(np.arange(above), np.diff(surface.start))
     keep = rows < surface.near
     # half of the outermost flesh lies between its middle and the rest
@@ -103,11 +102,10 @@ def joined(
             above + links.ends,
         ]
     )
-    weight = np.concatenate([thickness * surface.weight[keep], through, shrunk * links.weight])
+    weight = np.concatenate([thickness * surface.weight[keep], through, np.cbrt(less) * links.weight])
     volume = np.concatenate([thickness * surface.area, less * links.volume])
-    size = len(volume)
     _evened(volume, ends, np.abs(weight), above)
-    one_way = sparse.csr_array((weight, (ends[:, 0], ends[:, 1])), shape=(size, size))
+    one_way = sparse.csr_array((weight, (ends[:, 0], ends[:, 1])), shape=(len(volume),) * 2)
     graph = sparse.csr_array(one_way + one_way.T)
     graph.sort_indices()
     return Joint(
