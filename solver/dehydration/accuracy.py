@@ -5,7 +5,7 @@ Wrinkled skins bend over lengths of te, so what a mesh adds goes with the square
     error = RATE (h / te)^2 + SCATTER (min(gamma, 35) / 10)^POWER
 
 The second is what single seeds differ by from their mean. Stiff skins have few and large facets, of which a seed
-decides where they stand: at gamma = 10 seeds differ by up to 6 % of their mean, at 30 by 11 %, at 50 by 17 %, where the
+decides where they stand: at gamma = 10 seeds differ by up to 6 % of their mean, at 30 by 18 %, at 50 by 20 %, where the
 worst of all runs is off by 38 %. Past the onset it is a statement on descriptors alone: the pattern itself is chaotic.
 The runs are kept in `benchmarks/results/dehydration-meshes.json`.
 """
