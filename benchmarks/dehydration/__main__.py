@@ -25,7 +25,7 @@ from .precision.record import Record
 PLAN = (
     *((0.04, gamma, "xyz", quality, 6) for gamma in (10.0, 30.0, 50.0) for quality in ("preview", "default", "fine")),
     *((0.04, 10.0, "", quality, seeds) for quality, seeds in (("preview", 3), ("default", 2), ("fine", 2))),
-    *((0.04, 30.0, "", quality, 3) for quality in ("default", "fine")),
+    *((0.04, 30.0, "", quality, seeds) for quality, seeds in (("default", 3), ("fine", 2))),
 )
 THIN = (
     *((0.02, 10.0, "xyz", quality, 2) for quality in ("preview", "default", "fine")),
