@@ -113,7 +113,17 @@ def test_a_run_stays_where_its_fruit_keeps_its_bumps() -> None:
     assert rough[2] < 0.6 * rough[0]
 
 
-@pytest.mark.parametrize(("steps", "most"), [(500, 800), (1, 600)])
+def test_a_run_of_a_table_is_as_rough_as_before() -> None:
+    """About the onset wrinkles give way softly: let go too soon, this one lost 2 % of its roughness on the way."""
+    table = ShapeTable.open(ROOT, "plum2", surfaces=registry.surface)
+    distance = balance.distance(SOLVER, table, {"te": 0.03, "gamma": 14.0}, 0.1, "nearest", Store.open(ROOT))
+    assert distance is not None
+    assert distance.residual <= RESIDUAL
+    assert abs(distance.rgh - 1) < 0.005
+    assert distance.moved < 0.01
+
+
+@pytest.mark.parametrize(("steps", "most"), [(500, 800), (1, 800)])
 def test_so_many_steps_and_no_more(steps: int, most: int) -> None:
     """What it takes to put a surface on, to calm it and to look at it once is always taken."""
     solver = registry.get("dehydration")
@@ -137,7 +147,7 @@ def test_what_blows_up_is_pushed_on_in_more_increments(monkeypatch: pytest.Monke
     found = solver.relaxed(solver.parse(EIGHTH), ridged(0.83, 0.03), 0.2, NEED, steps=1).isel(stage=0)
     assert tried == [5, 15]
     # those that led nowhere are not counted
-    assert 300 <= int(found["iterations"]) < 300 + 15 * 20 + 200
+    assert 300 <= int(found["iterations"]) < 300 + 25 * 20 + 200
     enough = 1000
     with pytest.raises(Unstable, match="blew up"):
         solver.relaxed(solver.parse(EIGHTH), ridged(0.83, 0.03), 0.2, NEED, steps=1)
