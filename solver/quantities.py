@@ -97,7 +97,7 @@ register(
 register(
     position=Quantity("1", "position of the outer surface, in units of r1", "x"),
     displacement=Quantity("1", "displacement of the outer surface from the fresh shape, in units of r1", "u"),
-    mean_radius=Quantity("1", "area-weighted mean distance of the surface from the centre, in units of r1", "r_mean"),
+    mean_radius=Quantity("1", "mean distance from the centre, weighted by the fresh area, in units of r1", "r_mean"),
     roughness=Quantity("1", "rms of the radial wrinkle amplitude (degrees l >= 3), in units of r1", "A_rms"),
     dominant_degree=Quantity("1", "power-weighted mean spherical-harmonic degree of the wrinkles (l >= 3)", "l"),
     wavelength=Quantity("1", "wavelength of the dominant degree on the shrunk surface, in units of r1", "lambda"),
