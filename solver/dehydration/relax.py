@@ -2,7 +2,8 @@
 
 A looked-up shape is near many equilibria and on none. Its surface is pushed on in a few increments, the inside
 following with the cube of its depth and settling after each, its volumes going with the pressure; then it is held until
-the inside has come to rest, and all is free. The pattern stays, the residual falls a hundredfold in some hundred steps: what a run needs many thousands for.
+the inside has come to rest, and all is free. The pattern stays, the residual falls a hundredfold in some hundred steps:
+what a run needs many thousands for.
 
 What is slow then is the skin: scaled by its thickness, its mass is large beside what holds a wrinkle back. Damping that
 calms the inside would hold it for thousands of steps, so that it is taken away by and by. Rest volumes stay as they
