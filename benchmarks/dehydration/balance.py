@@ -1,8 +1,8 @@
 """How far look-ups are from equilibrium, and what relaxing them costs: python -m benchmarks.dehydration.balance.
 
 Of families in the package, at random points between their samples, and at some of these: from which residual, and how
-far, 600 steps of the solver move what each method looks up, and how its statistics compare with what becomes of it
-(record dehydration-score). Fruits keep the bumps and the pattern that runs begin with, which come with the package. The
+far, the solver moves what each method looks up until it is in balance, and how its statistics compare with what becomes
+of it (record dehydration-score). Fruits keep the bumps and the pattern that runs begin with, which come with the package. The
 record is kept after each family, and what it has of this version of the solver is not done again; of others it keeps
 what is of the tables of now, until these families are asked for.
 
@@ -117,7 +117,7 @@ def _score(names: Sequence[str] | None, stages: Sequence[float], count: int) -> 
             continue
         begin, made = time.process_time(), {"version": SOLVER.version, **about[name]}
         runs[name] = {**made, "each": list(_measured(opened[name], package, stages, count))}
-        figures.keep(NAME, [runs[k] for k in about if k in runs], "dehydration", steps=balance.STEPS)
+        figures.keep(NAME, [runs[k] for k in about if k in runs], "dehydration")
         print(f"{name}: {time.process_time() - begin:.0f} s of the processor", file=sys.stderr, flush=True)
 
 

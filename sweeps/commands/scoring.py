@@ -54,9 +54,9 @@ def score(
     local slope energy. L2nr, ang \[degree] and corr: point by point. The method "seed" is the floor: how two runs
     differ whose seeds alone do.
 
-    With --relax also the distance to equilibrium: the residual of a looked-up shape on the solver's mesh, how far 600
-    steps of the solver move it (rms over its roughness), and how its roughness, bands and slopes compare with what
-    becomes of it. Fruits keep the pattern that their runs start from, if the store holds its run.
+    With --relax also the distance to equilibrium: the residual of a looked-up shape on the solver's mesh, how far
+    the solver moves it (rms over its roughness) until it is in balance, and how its roughness, bands and slopes compare
+    with what becomes of it. Fruits keep the pattern that their runs start from, if the store holds its run.
 
     [bold]Examples[/bold]
 
@@ -140,7 +140,7 @@ def _distances(table: ShapeTable, names: Sequence[str], count: int, store: Store
 
 
 def _show_distances(console: Any, rows: Sequence[Distance], symbol: str) -> None:
-    console.print("relaxed for 600 steps, looked up over what became of it:", markup=False)
+    console.print("relaxed until in balance, looked up over what became of it:", markup=False)
     names = [name for name in rows[0].to_json() if name not in ("method", "stage")]
     cells = [[row.method, f"{row.stage:g}", *(f"{row.to_json()[name]:.3g}" for name in names)] for row in rows]
     grid(console, ["method", symbol, *names], cells)

@@ -1,7 +1,7 @@
 """How far looked-up shapes are from equilibrium: how the solver moves them when it relaxes them.
 
 Deep in the folds a run is one of many equilibria, so that correlation with one run is the wrong judge of a look-up. The
-right one: put on the mesh, from which residual does it start, how far does it go in some hundred steps, and does it
+right one: put on the mesh, from which residual does it start, how far does it go until forces balance, and does it
 still look the same afterwards?
 
 On the mesh of which fruit matters: runs begin with bumps, and with a pattern that they share, which are part of their
@@ -26,10 +26,7 @@ from store.surfaces.measures import Surface
 
 from ..relaxing import begun, lattice_of
 
-__all__ = ["STEPS", "Distance", "at_hand", "between", "distance", "mean"]
-
-#: Steps for which a shape is relaxed.
-STEPS = 600
+__all__ = ["Distance", "at_hand", "between", "distance", "mean"]
 
 
 @dataclass(frozen=True)
@@ -73,7 +70,7 @@ def at_hand(table: ShapeTable, store: Store) -> bool:
 def distance(
     solver: Solver, table: ShapeTable, values: dict[str, float], stage: float, method: str, store: Store | None = None
 ) -> Distance | None:
-    """Relax what a method looks up for `STEPS` steps on the mesh of its runs; None where the solver cannot.
+    """Relax what a method looks up on the mesh of its runs until it is in balance; None where the solver cannot.
 
     With a `store` that has what they begin with (see `at_hand`), else without the pattern that they share.
 
@@ -90,7 +87,7 @@ def distance(
     told, library = table.at_parameters(values), None if store is None else store.find
     params = solver.parse({name: value for name, value in told.items() if library is not None or name != "pattern"})
     try:
-        found = solver.relaxed(params, surface, stage, need, Context(library=library), STEPS).isel(stage=0)
+        found = solver.relaxed(params, surface, stage, need, Context(library=library)).isel(stage=0)
     except SolverError as error:
         if error.code == "invalid-input":
             raise
