@@ -2,9 +2,9 @@
 
 Of families in the package, at random points between their samples, and at some of these: from which residual, and how
 far, the solver moves what each method looks up until it is in balance, and how its statistics compare with what becomes
-of it (record dehydration-score). Fruits keep the bumps and the pattern that runs begin with, which come with the package. The
-record is kept after each family, and what it has of this version of the solver is not done again; of others it keeps
-what is of the tables of now, until these families are asked for.
+of it (record dehydration-score). Fruits keep the bumps and the pattern that runs begin with, which come with the
+package. The record is kept after each family, and what it has of this version of the solver is not done again; of
+others it keeps what is of the tables of now, until these families are asked for.
 
 With --tier, of fruits of the default family and of that of te = 0.01 in the package instead: the tier between table and
 run, with seconds by the clock and of the processor, on as many threads as there are, after a first one (record
