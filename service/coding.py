@@ -75,6 +75,7 @@ class Coding:
                     # the tag that the client has, in its own spelling
                     mine = [part.strip() for part in known.split(",") if _TAGGED.sub("", part.strip()) == tag]
                     headers["etag"] = mine[0] if mine else tag
+                    headers.add_vary_header("Accept-Encoding")  # caches take these words over to what they keep
                 elif tag and coding:
                     headers["etag"] = f'{tag[:-1]}-{coding}"'
             await send(message)

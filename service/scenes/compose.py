@@ -21,6 +21,8 @@ from .request import Scene
 
 __all__ = ["Made", "make"]
 
+#: Formats that hold an item's variants.
+_OFFER = ("usdc", "usda")
 #: Share of detail that is left, at most, where a file came out larger than expected and is made again.
 _LESS = 0.8
 
@@ -60,7 +62,7 @@ def make(
     lap("understood")
     everything, rests = place(scene, kinds, rows)
     lap("placed")
-    inner, outer = _reaches(scene, kinds, everything)
+    inner, outer = _reaches(scene, kinds, everything, to)
     found = seen.view(scene.camera, everything.centre, outer)
     if scene.cull:
         found.why[seen.hidden(scene.camera, found, inner, outer)] = seen.BEHIND
@@ -71,42 +73,62 @@ def make(
     visible, pixels = everything.only(shown), found.pixels[shown]
     lap("seen")
     held = props.held(scene) if scene.props else []
-    encoders: dict[str, Callable[..., bytes]] = {"glb": glb.encode, "usdc": usd.usdc, "usda": usd.usda}
-    encoder = encoders.get(to)
     compress = compress and to == "glb" and glb.compressor() is not None
-    form = "packed" if compress else ("glb" if encoder is None else to)
-    data, share = b"", 1.0
-    while True:
-        levels = detail.choose(scene.budget, kinds, visible.kind, pixels, form, share)
-        if encoder is None:
-            break
-        more = {"known": frozenset(scene.known)} if to == "glb" else {}
-        data = encoder(kinds, visible, levels.n, held, scene.unit, compress, **more)
-        if scene.budget.bytes is None or len(data) <= scene.budget.bytes:
-            break
-        if (levels.n == detail.RUNGS[0]).all():
-            larger = len(data) / levels.bytes
-            raise OverBudget.of(detail.over(scene.budget, levels, kinds, visible.kind, pixels, form, larger))
-        # a lattice's bytes go with its square
-        share = min(_LESS, math.sqrt(scene.budget.bytes / len(data))) * levels.share
+    data, levels = _written(scene, kinds, visible, pixels, held, to, compress)
     lap("computed and written")
     told = report.Told(scene, kinds, rows, everything, found, shown, levels, rests, len(data), compress, times)
     return Made(data, report.document(told))
 
 
-def _reaches(scene: Scene, kinds: Sequence[Kind], everything: Instances) -> tuple[Floats, Floats]:
-    """Return radii of the balls within and around every instance [scene unit].
+def _written(
+    scene: Scene,
+    kinds: Sequence[Kind],
+    visible: Instances,
+    pixels: Floats,
+    held: Sequence[props.Prop],
+    to: str,
+    compress: bool,
+) -> tuple[bytes, detail.Levels]:
+    """Return the file of what is seen, empty where only the report was asked for, and its levels of detail.
+
+    Raises:
+        OverBudget: the coarsest shapes cost more than the budget; it says what to drop.
+
+    """
+    encoders: dict[str, Callable[..., bytes]] = {"glb": glb.encode, "usdc": usd.usdc, "usda": usd.usda}
+    encoder = encoders.get(to)
+    form = "packed" if compress else ("glb" if encoder is None else to)
+    told = kinds, visible.kind, pixels, form
+    share = 1.0
+    while True:
+        levels = detail.choose(scene.budget, *told, share, visible.mirrored, encoder is not None)
+        if encoder is None:
+            return b"", levels
+        more = {"known": frozenset(scene.known)} if to == "glb" else {}
+        data = encoder(kinds, visible, levels.n, held, scene.unit, compress, **more)
+        if scene.budget.bytes is None or len(data) <= scene.budget.bytes:
+            return data, levels
+        if (levels.n == detail.RUNGS[0]).all():
+            larger = len(data) / levels.bytes
+            raise OverBudget.of(detail.over(scene.budget, levels, *told, visible.mirrored, larger))
+        # a lattice's bytes go with its square
+        share = min(_LESS, math.sqrt(scene.budget.bytes / len(data))) * levels.share
+
+
+def _reaches(scene: Scene, kinds: Sequence[Kind], everything: Instances, to: str) -> tuple[Floats, Floats]:
+    """Return radii of the balls within and around every instance [scene unit], at whatever stage the file may show it.
 
     Kinds of which nothing is in sight, by a ball around the fresh shape, are not looked up at all.
     """
-    fresh = np.array([kind.fresh_reach for kind in kinds])
+    shown = [(kind, *kind.variants) if to in _OFFER else (kind,) for kind in kinds]
+    fresh = np.array([max(one.fresh_reach for one in stages) for stages in shown])
     outer = fresh[everything.kind] * everything.scale
     inner = np.zeros(len(outer))
     near = seen.view(scene.camera, everything.centre, outer).why == seen.SEEN
     for k in np.unique(everything.kind[near]) if scene.cull else ():
         which = everything.kind == k
-        within_and_around = kinds[k].reach
-        inner[which], outer[which] = (radius * everything.scale[which] for radius in within_and_around)
+        within, around = zip(*(one.reach for one in shown[k]), strict=True)
+        inner[which], outer[which] = (radius * everything.scale[which] for radius in (min(within), max(around)))
     return inner, outer
 
 

@@ -69,7 +69,7 @@ def document(told: Told) -> dict[str, Any]:
         "shown": int(told.shown.sum()),
         "left_out": why,
         "kinds": len(told.kinds),
-        "missing": sum(kind.missing is not None for kind in told.kinds),
+        "missing": sum(_lacks(kind) != {} for kind in told.kinds),
         "meshes": len(distinct),
         "triangles": told.levels.triangles,
         "bytes": told.size,
@@ -114,7 +114,6 @@ def _item(
     one, kind = told.scene.items[i], told.kinds[told.rows[i][0]]
     if len(rows) == 1 and not ranks.shown[rows[0]]:
         # most items of a large scene
-        lacks = {} if kind.missing is None else {"missing": kind.missing.to_json()}
         return {
             "name": one.name or kind.label,
             **kind.source,
@@ -126,7 +125,7 @@ def _item(
             "skipped": {_WHY[ranks.why[rows[0]]]: 1},
             "lattices": {},
             "milliseconds_saved": round(least if kind.topology is None else 0.0, 2),
-            **lacks,
+            **_lacks(kind),
         }
     if len(rows) == len(told.rows[i]) == 1 and kind.missing is None and not kind.variants:
         return _single(told, i, rows[0], ranks, spent, least, first)
@@ -151,13 +150,18 @@ def _item(
         "lattices": {str(size): count for size, count in lattices},
         "milliseconds_saved": round(max(alone - used, 0.0), 2),
     }
-    if kind.missing is not None:
-        said["missing"] = kind.missing.to_json()
+    said |= _lacks(kind)
     if kind.variants:
         said["variants"] = [other.label for other in kind.variants]
     if len(told.rows[i]) > 1:
         said["shapes"] = len({k for _, k in pairs})
-    return said | _worst([told.kinds[k].trust([n for n, own in pairs if own == k]) for k in {k for _, k in pairs}])
+    return said | _worst(told.kinds, pairs)
+
+
+def _lacks(kind: Kind) -> dict[str, Any]:
+    """Return which run is not stored: the item's own, or else that of a variant."""
+    lacking = [one.missing for one in (kind, *kind.variants) if one.missing is not None]
+    return {"missing": lacking[0].to_json()} if lacking else {}
 
 
 def _single(
@@ -184,11 +188,16 @@ def _single(
     }
 
 
-def _worst(said: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return what those shapes say of themselves that are least to be trusted."""
+def _worst(kinds: Sequence[Kind], pairs: Sequence[tuple[int, int]]) -> dict[str, Any]:
+    """Return what those shapes say of themselves that are least to be trusted, of kinds with levels and of variants."""
 
-    def doubt(one: dict[str, Any]) -> tuple[bool, bool, float]:
+    def doubt(one: dict[str, Any]) -> tuple[bool, bool, bool, float]:
         known = one.get("expected_error")
-        return one.get("converged") is False, known is None, max(map(abs, (known or {}).values()), default=0.0)
+        most = max(map(abs, (known or {}).values()), default=0.0)
+        return one.get("converged") is False, known is None, one.get("exact") is False, most
 
-    return max(said, key=doubt, default={})
+    levels: dict[int, list[int]] = {}
+    for n, k in pairs:
+        levels.setdefault(k, []).append(n)
+    said = [one.trust(own) for k, own in levels.items() for one in (kinds[k], *kinds[k].variants)]
+    return max(filter(None, said), key=doubt, default={})

@@ -24,8 +24,8 @@ _HIDING = 3000
 
 
 class View(NamedTuple):
-    """By instance (b): why it is left out, its diameter on the screen [pixel], and its place in the camera's frame
-    (b, 3): to the right, up, and ahead [scene unit].
+    """By instance (b): why it is left out, its diameter in the middle of the screen [pixel], and its place in the
+    camera's frame (b, 3): to the right, up, and ahead [scene unit].
     """
 
     why: Array
@@ -60,7 +60,9 @@ def view(camera: Camera, centre: Floats, outer: Floats) -> View:
     # a ball's outline is wider than its diameter at its centre, as near as one may come
     apart = np.sqrt(np.maximum(distance**2 - outer**2, (1e-3 * outer) ** 2))
     pixels = outer / apart * camera.height / tall
-    why[(why == SEEN) & (pixels < _LEAST)] = SMALL
+    # away from the middle a flat picture draws it longer, most in its corners
+    along = np.maximum(place[:, 2] / np.maximum(distance, 1e-300), 1 / math.hypot(1, tall, wide))
+    why[(why == SEEN) & (pixels / along**2 < _LEAST)] = SMALL
     return View(why, pixels, place)
 
 

@@ -78,8 +78,7 @@ def _encode(
         instancer.CreateOrientationsAttr(Vt.QuathArray(turns))
         scales = np.repeat(seen.scale[:, None], 3, axis=1).astype(np.float32)
         instancer.CreateScalesAttr(Vt.Vec3fArray.FromNumpy(scales))
-        extent = instancer.ComputeExtentAtTime(Usd.TimeCode.Default(), Usd.TimeCode.Default())
-        instancer.CreateExtentAttr(extent)
+        _bound(instancer, moments)
     for place, prop in enumerate(held):
         _prop(stage, f"/scene/{prop.name}{place}", prop, materials)
     with tempfile.TemporaryDirectory(prefix="wizen-") as folder:
@@ -89,6 +88,25 @@ def _encode(
 
 
 usdc, usda = partial(_encode, "usdc"), partial(_encode, "usda")
+
+
+def _bound(instancer: Any, moments: Sequence[float]) -> None:
+    """Write a box that holds all instances: at every knot of curves, and whichever variants are chosen."""
+    from pxr import Usd
+
+    times = [Usd.TimeCode.Default(), *(Usd.TimeCode(time) for time in sorted({FPS * seconds for seconds in moments}))]
+    prims = [instancer.GetPrim().GetStage().GetPrimAtPath(path) for path in instancer.GetPrototypesRel().GetTargets()]
+    choices = [prim.GetVariantSets().GetVariantSet(_VARIANTS) for prim in prims if prim.HasVariantSets()]
+    chosen, names = [one.GetVariantSelection() for one in choices], [one.GetVariantNames() for one in choices]
+    boxes = []
+    for place in range(max(map(len, names), default=1)):
+        for choice, offered in zip(choices, names, strict=True):
+            choice.SetVariantSelection(offered[min(place, len(offered) - 1)])
+        boxes.append([np.array(instancer.ComputeExtentAtTime(time, time)) for time in times])
+    for choice, name in zip(choices, chosen, strict=True):
+        choice.SetVariantSelection(name)
+    for time, low, high in zip(times, np.min(boxes, axis=0)[:, 0], np.max(boxes, axis=0)[:, 1], strict=True):
+        instancer.CreateExtentAttr().Set(_vectors(np.stack([low, high])), time)
 
 
 def _prototype(stage: Any, path: str, kind: Kind, n: int, mirrored: bool, material: Any) -> None:

@@ -186,7 +186,7 @@ class Sequence:
             return self
         if not self.kept:
             raise UnfitFormat(
-                "textures need triangles that stay, and this result's change from stage to stage.",
+                "textures need triangles that stay, and those of such a run may change from stage to stage.",
                 advice=instead,
             )
         return replace(self, run=charts.laid(self.run))

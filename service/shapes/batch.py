@@ -82,10 +82,10 @@ def batch(request: Request, body: BatchRequest) -> Response:
     queries = [one.query for one in distinct]
     # of an archive, positions: the other half of it only for those who name it
     fields = ("position",) if chosen.name == "npz" and detail.fields is None else detail.of(chosen)
-    _check_shapes(table, queries, "position" in fields)
+    _check_shapes(table, queries, rows, "position" in fields)
     options: dict[str, Any] = {} if body.method is None else {"method": body.method}
     if body.max_error is not None:
-        _check_trust(table, queries, {**options, "max_error": body.max_error})
+        _check_trust(table, queries, rows, {**options, "max_error": body.max_error})
 
     def at(one: Asked) -> Shape:
         point, stage = one.query.point, one.query.stage
@@ -224,38 +224,43 @@ def _queries(entries: list[Mapping[str, float]], words: Words, found: Found, off
     return queries
 
 
-def _check_shapes(table: ShapeTable, queries: list[ShapeQuery], wanted: bool) -> None:
-    """Refuse points where no shape exists though every number is on its axis.
+def _check_shapes(table: ShapeTable, queries: list[ShapeQuery], rows: list[int], wanted: bool) -> None:
+    """Refuse points where no shape exists though every number is on its axis; `rows` as in `batch_detail.distinct`.
 
     Raises:
         InvalidQuery: listing them.
 
     """
-    wrong: list[Wrong] = []
-    for i, query in enumerate(queries if wanted else []):
+    wrong: dict[int, Wrong] = {}
+    for row, query in enumerate(queries if wanted else []):
         try:
             table.fresh(query.point)
         except SolverError as error:
-            wrong += batch_detail.entry(i, [Wrong("", error.message, error.advice)])
+            wrong[row] = Wrong("", error.message, error.advice)
     if wrong:
-        raise batch_detail.summed(InvalidQuery, wrong)
+        raise batch_detail.summed(InvalidQuery, _of_points(wrong, rows))
 
 
-def _check_trust(table: ShapeTable, queries: list[ShapeQuery], options: Mapping[str, Any]) -> None:
-    """Refuse shapes that may be too far off.
+def _check_trust(table: ShapeTable, queries: list[ShapeQuery], rows: list[int], options: Mapping[str, Any]) -> None:
+    """Refuse shapes that may be too far off; `rows` as in `batch_detail.distinct`.
 
     Raises:
         UncertainBatch: listing them.
 
     """
-    wrong: list[Wrong] = []
-    for i, query in enumerate(queries):
+    wrong: dict[int, Wrong] = {}
+    for row, query in enumerate(queries):
         try:
             table.at(query.point, query.stage, fields=(), **options)
         except TooUncertain as error:
-            wrong += batch_detail.entry(i, [Wrong("", *_said(error))])
+            wrong[row] = Wrong("", *_said(error))
     if wrong:
-        raise batch_detail.summed(UncertainBatch, wrong)
+        raise batch_detail.summed(UncertainBatch, _of_points(wrong, rows))
+
+
+def _of_points(wrong: Mapping[int, Wrong], rows: list[int]) -> list[Wrong]:
+    """Return what is wrong with distinct shapes under the numbers of all points that ask for them."""
+    return [one for i, row in enumerate(rows) if row in wrong for one in batch_detail.entry(i, [wrong[row]])]
 
 
 def _said(error: StoreError) -> tuple[str, str]:

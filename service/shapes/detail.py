@@ -21,7 +21,8 @@ __all__ = ["NAMES", "PIXELS_PER_CELL", "Detail", "parameters", "read"]
 #: What this module reads of a query.
 NAMES = ("screen_px", "distance", "fov", "region", "fields", "components")
 
-#: Pixels that a cell of the lattice covers, at most, where it faces the eye; shading hides smaller ones.
+#: Pixels that a cell of the lattice covers, at most, where it faces the eye; shading hides smaller ones. So it is on a
+#: sphere: over the package's presets cells are up to 5 pixels long where fruits are fresh, and 7 in folds.
 PIXELS_PER_CELL = 4.0
 #: Vertical angle of view [degree] of a camera whose distance is given without one.
 _FOV = 40.0
@@ -68,7 +69,7 @@ class Detail(NamedTuple):
         return min(self.cells or own, highest) if named is None else named
 
     def _pixels(self, resolution: int) -> float:
-        """Return how many pixels a cell facing the eye covers at most: more than wanted where a limit cut it short."""
+        """Return how many pixels a sphere's cell facing the eye covers at most: more where a limit cut it short."""
         return round(PIXELS_PER_CELL * max((self.cells or 0) / resolution, 1), 3)
 
     def said(self, resolution: int, band: int) -> dict[str, Any]:
@@ -98,9 +99,10 @@ def parameters() -> dict[str, tuple[str, Mapping[str, Any]]]:
     positive: dict[str, Any] = {"type": "number", "exclusiveMinimum": 0}
     return {
         "screen_px": (
-            "Chooses the resolution, in place of `resolution`: pixels that the fruit's diameter fills, or with "
-            f"`distance` the picture's height. Cells facing the eye then cover {PIXELS_PER_CELL:g} pixels at most; "
-            "more where the service allows no finer lattice, as `pixels_per_cell` of the answer's `detail` says.",
+            "Chooses the resolution, in place of `resolution`: pixels that 2 r1 fill, or with `distance` the picture's "
+            f"height. Cells of a sphere of radius r1 that face the eye then cover {PIXELS_PER_CELL:g} pixels at most; "
+            "more where the service allows no finer lattice, as `pixels_per_cell` of the answer's `detail` says. "
+            "Those of longer fruits are up to a quarter longer, and where a skin is folded three quarters.",
             {**positive, "examples": [600]},
         ),
         "distance": ("From the eye to the fruit's nearest point [r1]; needs screen_px", {**positive, "examples": [3]}),
@@ -139,10 +141,10 @@ def read(given: Mapping[str, str]) -> Detail:
 
 
 def _cells(given: Mapping[str, str], wrong: list[Wrong]) -> int | None:
-    """Return the resolution at which a cell facing the eye covers `PIXELS_PER_CELL`.
+    """Return the resolution at which a cell of a sphere of radius r1 that faces the eye covers `PIXELS_PER_CELL`.
 
-    Without a distance, the fruit of diameter 2 r1 fills `screen_px`; with one, `screen_px` is the height of a picture
-    taken with the angle of view `fov`, from `distance` r1 away from the nearest point of the fruit.
+    Without a distance, the sphere's diameter of 2 r1 fills `screen_px`; with one, `screen_px` is the height of a
+    picture taken with the angle of view `fov`, from `distance` r1 away from the nearest point of the fruit.
     """
     names = ("screen_px", "distance", "fov")
     numbers = {name: _positive(name, given[name], wrong) for name in names if name in given}

@@ -62,7 +62,9 @@ async def shape(
     Lengths are in units of the reference radius r1. The representation follows `format`, or else `Accept`. Formats
     without triangles (npz, points) say in `lattice` which points make one: a quad's corners a, b in a row and c, d in
     the next are the triangles (a, b, c) and (b, d, c). `volume` and `crossings` are measured on that mesh,
-    `descriptors` on the runs behind it.
+    `descriptors` on the runs behind it. points are little-endian: `WIZP`, the version 1, n and the length of the JSON
+    that follows (three uint32), that JSON, then float32 x, y, z of n rows of 2n points, and of the north and the south
+    pole.
 
     Every answer says what error to expect (`expected_error`, by measure) and whether it lies between the runs
     (`inside`); `max_error` refuses what is worse, and `exact=run` with a token runs what is refused or off the table;

@@ -146,6 +146,8 @@ def test_shapes_that_may_be_too_far_off_are_named(client: httpx.Client) -> None:
     assert answer.status_code == 422
     assert answer.json()["type"] == "urn:wizen:problem:too-uncertain"
     assert [wrong["name"] for wrong in answer.json()["errors"]] == ["points[1]"]
+    again = ask(client, points=[ROWS[1], ROWS[1], ROWS[0], ROWS[1], ROWS[0]], max_error=1e-6)
+    assert [wrong["name"] for wrong in again.json()["errors"]] == ["points[2]", "points[4]"]
 
 
 def test_methods(client: httpx.Client, built: Path) -> None:

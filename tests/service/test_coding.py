@@ -53,6 +53,7 @@ def test_a_coded_answer_is_the_plain_one_under_another_tag(client: httpx.Client,
         assert tag == f'{plain.headers["etag"][:-1]}-{name}"'
     again, nothing = raw(client, name, **{"If-None-Match": f'"other", {tag}'})
     assert (again.status_code, nothing, again.headers["etag"]) == (304, b"", tag)
+    assert again.headers["vary"] == answer.headers["vary"]
     # the same shape, whichever coding it came in
     assert raw(client, "identity", **{"If-None-Match": tag})[0].status_code == 304
     assert raw(client, name, **{"If-None-Match": '"other-gzip"'})[0].status_code == 200

@@ -21,7 +21,7 @@ __all__ = ["COARSE", "RUNGS", "Curve", "Kind"]
 #: Levels of detail: few, so that instances share them. Level n has 4 n^2 triangles, or at most about as many.
 RUNGS = np.array([8, 16, 24, 32, 48, 64, 96, 128, 192, 256])
 #: Colatitudes of the lattice that says how far a looked-up shape reaches and what hides behind it.
-COARSE = 16
+COARSE = 32
 
 #: Seconds and stages.
 Curve = tuple[tuple[float, float], ...]

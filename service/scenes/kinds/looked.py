@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Hashable, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,9 @@ from .kind import COARSE, RUNGS, Curve, Kind
 
 __all__ = ["Looked"]
 
-#: Share of the least radius of the coarse lattice that surely is within the shape, between its samples too.
-_WITHIN = 0.9
+#: Shares of the least and the largest radius of the coarse lattice, within and beyond which a shape of any lattice has
+#: no point: over the package's tables they are .97 and 1.027.
+_WITHIN, _AROUND = 0.9, 1.04
 
 
 @dataclass(eq=False)
@@ -41,6 +42,7 @@ class Looked(Kind):
     metres: float | None = None
     shapes: dict[int, Shape] = field(default_factory=dict)
     spent: dict[int, float] = field(default_factory=dict)
+    _ends: list[_Said] = field(default_factory=list)
 
     def shape(self, n: int) -> Shape:
         """Return the shape on the lattice of n colatitudes."""
@@ -56,6 +58,7 @@ class Looked(Kind):
         start = time.thread_time()
         found = [self.table.at(self.point, stage, resolution=n) for _, stage in self.curve[1:]]
         self.spent[n] = self.spent.get(n, 0.0) + time.thread_time() - start
+        self._ends = [_said(shape) for shape in found]
         return found
 
     @property
@@ -108,7 +111,7 @@ class Looked(Kind):
         for shape in self.later(COARSE):
             r = np.linalg.norm(mesh.vertices(*mesh.surface(shape)), axis=1)
             low, high = min(low, float(r.min())), max(high, float(r.max()))
-        return _WITHIN * low, 1.03 * high
+        return _WITHIN * low, _AROUND * high
 
     def holds(self, point: Floats) -> bool:
         """Return whether a point is nearer to the middle than the surface is in its direction."""
@@ -203,13 +206,30 @@ class Looked(Kind):
         return {"colatitudes": n, "r1": 1 / self.step}
 
     def trust(self, levels: Sequence[int]) -> dict[str, Any]:
-        """Return what the look-up says of itself."""
+        """Return what the look-ups say of themselves; on a curve, the worst of its stages by measure."""
         looked = [self.shapes[n] for n in levels if n in self.shapes] or (
             [self.shapes[COARSE]] if COARSE in self.shapes else []
         )
         if not looked:
             return {}
-        shape = looked[-1]
-        error = shape.expected_error
-        told = None if error is None else {name: round(v, 5) for name, v in error.items()}
-        return {"expected_error": told, "exact": shape.exact, "converged": shape.converged}
+        said = [_said(looked[-1]), *self._ends]
+        errors = [one.expected_error for one in said if one.expected_error is not None]
+        names = dict.fromkeys(name for error in errors for name in error) if len(errors) == len(said) else None
+        told = None if names is None else {name: round(max(e.get(name, 0.0) for e in errors), 5) for name in names}
+        return {
+            "expected_error": told,
+            "exact": all(one.exact for one in said),
+            "converged": all(one.converged for one in said),
+        }
+
+
+class _Said(NamedTuple):
+    """What a look-up says of itself, without its shape."""
+
+    expected_error: Mapping[str, float] | None
+    exact: bool
+    converged: bool
+
+
+def _said(shape: Shape) -> _Said:
+    return _Said(shape.expected_error, shape.exact, shape.converged)

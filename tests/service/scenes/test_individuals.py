@@ -14,6 +14,7 @@ from service.scenes.kinds import distinct
 from service.scenes.kinds.looked import Looked
 from service.scenes.request import Item, parse
 from service.shapes.live import LiveTables
+from service.views.scene import SceneItem
 from solver.registry import surface
 from store import starter
 from store.lookup import ShapeTable
@@ -126,12 +127,43 @@ def test_a_prototype_can_be_had_at_other_stages(tmp_path: Path) -> None:
         material, _ = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()
         worn.add(str(material.GetPath()))
     assert len(worn) == 4  # a drier skin is another one
+    # whichever is chosen is within the box by which readers cull
+    instancer, now = UsdGeom.PointInstancer(stage.GetPrimAtPath("/scene/fruits")), Usd.TimeCode.Default()
+    low, high = np.array(instancer.GetExtentAttr().Get())
+    for name in choice.GetVariantNames():
+        choice.SetVariantSelection(name)
+        box = np.array(instancer.ComputeExtentAtTime(now, now))
+        assert (box[0] > low - 1e-5).all()
+        assert (box[1] < high + 1e-5).all()
     # a file of one stage has no choice
     plain = tmp_path / "plain.usdc"
     plain.write_bytes(made({"preset": "raisin", "stage": 0.2}, "usdc").data)
     single = Usd.Stage.Open(str(plain))
     prim = single.GetPrimAtPath("/scene/fruits/prototypes/shape0")
     assert prim.GetVariantSets().GetNames() == []
+
+
+def test_what_a_variant_alone_shows_is_not_left_out() -> None:
+    """A fresh fruit reaches into the picture where the dry one does not, and less is behind the dry one."""
+    pytest.importorskip("pxr")
+    item = {"preset": "plum2", "stage": 0.3, "transforms": [{"position": [6.94, 0, 0]}]}
+
+    def told(*items: dict[str, Any]) -> dict[str, Any]:
+        found: dict[str, Any] = make(parse({"camera": CAMERA, "items": items}), TABLES, 512, "usdc").report
+        assert {name for one in found["items"] for name in one} <= SceneItem.model_fields.keys()
+        return found
+
+    shown = [told({**item, **more}) for more in ({}, {"variants": [0.0]})]
+    assert [report["shown"] for report in shown] == [0, 1]
+    front = {"preset": "sphere", "stage": 0.0, "transforms": [{}]}
+    back = {"preset": "sphere", "stage": 0.3, "size": 0.75, "transforms": [{"position": [0, 0, -3]}]}
+    assert told(front, back)["left_out"]["behind others"] == 1
+    offered = told({**front, "variants": [0.3]}, back)
+    assert offered["left_out"]["behind others"] == 0
+    # and what is said of the item holds for all that can be chosen
+    assert offered["items"][0]["exact"] is True
+    assert told({**front, "variants": [0.27]})["items"][0]["exact"] is False
+    assert told({**front, "seed": 1, "differ": 0.2, "shapes": 3})["items"][0]["shapes"] == 1
 
 
 def test_a_skin_wears_as_it_dries(tmp_path: Path) -> None:

@@ -68,6 +68,11 @@ def _from_nothing_to_a_shape(store: Store, queue_only: httpx.Client, anyone: htt
     tags = [parsed(data)[0]["meshes"][0]["extras"]["etag"] for data in (plain, file)]
     assert tags[0] != tags[1]  # who holds the placeholder is sent the shape
     assert told(anyone, **by_key)["run"] == job["id"]
+    # a variant that is not stored has something plain in its place, however well the item's own stage is known
+    offered = told(anyone, variants=[0.25, 0.3])
+    assert (offered["run"], offered["count"], offered["exact"]) == (job["id"], 1, False)
+    assert offered["missing"]["job"] is None
+    assert offered["missing"]["key"] != job["id"]
     # another stage is another run, and one that fails is said to
     assert told(anyone, stage=0.3)["count"] == 1
     fails = {"parameters": {"trouble": "refuses"}}

@@ -10,6 +10,7 @@ import pytest
 
 from service.scenes.compose import make
 from service.scenes.errors import InvalidScene
+from service.scenes.kinds.kind import COARSE
 from service.scenes.request import parse
 from service.shapes.live import LiveTables
 from solver.registry import surface
@@ -98,6 +99,21 @@ def test_individuals_that_change_are_where_those_are_that_stay() -> None:
     assert sorted(channel["target"]["node"] for channel in channels) == list(range(7))
 
 
+def test_an_item_is_as_right_as_the_worst_stage_of_its_curve() -> None:
+    """It begins with the fresh shape, which is exact; the rest is not."""
+
+    def told(*curve: list[float]) -> dict[str, Any]:
+        found: dict[str, Any] = made([{"preset": "jujube1", "curve": curve}]).report["items"][0]
+        return found
+
+    between = told([0, 0.0], [2, 0.27])
+    still = made([{"preset": "jujube1", "stage": 0.27}]).report["items"][0]
+    assert between["exact"] is False
+    assert between["expected_error"] == still["expected_error"]
+    assert told([0, 0.0], [1, 0.27], [2, 0.3])["expected_error"] == still["expected_error"]
+    assert told([0, 0.0], [2, 0.3])["exact"] is True
+
+
 def test_usd_samples_prototypes_over_time(tmp_path: Path) -> None:
     pytest.importorskip("pxr")
     from pxr import Usd, UsdGeom
@@ -113,6 +129,9 @@ def test_usd_samples_prototypes_over_time(tmp_path: Path) -> None:
     points = np.array(found.GetPointsAttr().Get(72))
     n = int(np.sqrt((len(points) - 2) / 2))
     assert np.abs(np.abs(points) - np.abs(own(0.25, n))).max() < 1e-5
+    instancer = UsdGeom.PointInstancer(stage.GetPrimAtPath("/scene/fruits"))
+    for time in (12, 48, 72):
+        assert np.allclose(instancer.GetExtentAttr().Get(time), instancer.ComputeExtentAtTime(time, time))
 
 
 def test_a_camera_that_moved_gets_what_it_lacks() -> None:
@@ -157,7 +176,7 @@ def test_known_meshes_are_not_computed(monkeypatch: pytest.MonkeyPatch) -> None:
 
     monkeypatch.setattr(ShapeTable, "at", at)
     made(items, known=tags)
-    assert max(asked, default=0) <= 16  # what is seen is told from the coarse one
+    assert max(asked, default=0) <= COARSE  # what is seen is told from the coarse one
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,7 @@ from scipy.spatial import cKDTree
 from service.scenes import compose, seen
 from service.scenes.compose import make
 from service.scenes.errors import InvalidScene, OverBudget
+from service.scenes.kinds import distinct
 from service.scenes.request import Camera, parse
 from service.shapes.live import LiveTables
 from solver.registry import surface
@@ -107,6 +108,19 @@ def test_nothing_that_the_camera_sees_is_left_out() -> None:
             assert not hidden or kept.report["left_out"]["behind others"]
 
 
+@pytest.mark.parametrize("name", ["jujube1", "jujube2", "raisin", "plum2"])
+def test_balls_that_are_culled_by_hold_the_shape_on_every_lattice(name: str) -> None:
+    table = ShapeTable.open(starter.ROOT, name, surfaces=surface)
+    item = {"preset": name, "parameters": {axis: low for axis, (low, _) in table.axes.items()}, "stage": table.reach[1]}
+    [kind], _ = distinct(parse({"camera": CAMERA, "items": [{**item, "transforms": [{}]}]}).items, TABLES, 512)
+    within, around = kind.reach
+    for n in (24, 48, 64, 128):
+        away = np.linalg.norm(kind.surfaces(n)[0][0], axis=1)
+        assert within < away.min()
+        assert away.max() < around
+    assert kind.fresh_reach > around
+
+
 def test_what_is_hidden_is_behind_every_line_of_sight() -> None:
     behind = [[0.0, 0.0, -4.0], [0.2, 0.1, -3.0]]
     scene = made([{"preset": "plum2", "stage": 0.1, "size": 2.0}, at(*behind, size=0.2), at([3.5, 0, -3], size=0.2)])
@@ -136,6 +150,23 @@ def test_a_ball_that_only_peeps_out_is_seen() -> None:
         ray = (points - [0, 0, 10]) / np.linalg.norm(points - [0, 0, 10], axis=1)[:, None]
         passes = np.linalg.norm(np.array([0, 0, 10]) - ray * (ray @ [0, 0, 10])[:, None], axis=1)
         assert not (hidden and (passes > 1.0).any())
+
+
+def test_what_a_wide_picture_draws_larger_in_its_corners_is_seen() -> None:
+    camera = Camera(position=(0, 0, 0), target=(0, 0, -1), fov=100, width=1600, height=900)
+    slope = 0.99 * np.array([1600 / 900, 1.0, 0]) * math.tan(math.radians(50)) - [0, 0, 1]
+    away = slope / np.linalg.norm(slope)
+    for share, why in ((0.9, seen.SMALL), (1.1, seen.SEEN)):
+        # the ends of the picture of a ball [pixel], from the middle of the picture outwards
+        middle, radius = 100 * away, 1e-3
+        while True:
+            half, off = math.asin(radius / 100), math.acos(-away[2])
+            long = (math.tan(off + half) - math.tan(off - half)) * 450 / math.tan(math.radians(50))
+            if long >= share:
+                break
+            radius *= 1.01
+        found = seen.view(camera, np.array([middle, [0, 0, -100.0]]), np.array([radius, radius]))
+        assert found.why.tolist() == [why, seen.SMALL]
 
 
 def test_kinds_out_of_sight_are_not_computed() -> None:
@@ -245,6 +276,28 @@ def test_as_many_bytes_come_as_are_expected(to: str) -> None:
         items = [{**at([x / 2, 0, z], size=0.2), "stage": 0.2 + x / 1000} for x in range(-6, 7)]
         told = made(items, to).report
         assert 1 / most < told["bytes_expected"] / told["bytes"] < most
+
+
+@pytest.mark.parametrize("to", ["glb", "usdc", "usda"])
+def test_the_bytes_that_a_refusal_names_are_enough(to: str) -> None:
+    """Also where stages over time, and mirror images, make a file larger than still shapes would."""
+    if to != "glb":
+        pytest.importorskip("pxr")
+    spots = [{"position": [x / 2, 0, 0], "scale": 0.2} for x in range(-6, 7)]
+    still = {**RAISIN, "seed": 1, "transforms": spots}
+    fading = {"preset": "plum2", "curve": [[0, 0.0], [1, 0.1], [2, 0.2]], "seed": 2, "transforms": spots}
+    with pytest.raises(OverBudget) as caught:
+        made([still, fading], to, budget={"bytes": 3000})
+    [wrong] = caught.value.wrong
+    found = re.search(r"llow (\d+)", wrong.advice)
+    assert found is not None, wrong.advice
+    assert len(made([still, fading], to, budget={"bytes": int(found[1])}).data) <= int(found[1])
+    told = made([still, fading], to).report
+    assert 1 / 1.3 < told["bytes_expected"] / told["bytes"] < 1.3
+    # with other limits no file is made, and the number is one that is expected
+    with pytest.raises(OverBudget) as caught:
+        made([still, fading], to, budget={"bytes": 3000, "triangles": 10})
+    assert "llow about" in caught.value.wrong[0].advice
 
 
 @pytest.mark.parametrize(("to", "share"), [("glb", 0.4), ("usdc", 0.4)])
