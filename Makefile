@@ -15,7 +15,7 @@ PAGE   := $(VIEWER)/dist/index.html
 NODE_FITS := const [a, b] = process.versions.node.split(".").map(Number); \
   process.exit((a == 20 && b >= 19) || (a == 22 && b >= 12) || a > 22 ? 0 : 1)
 
-.PHONY: blender demo demo-map page test test-clients test-processor test-slow mutants bench docs stress lint format clean constraints
+.PHONY: help blender demo demo-map page test test-clients test-processor test-slow mutants bench docs stress lint format clean constraints
 
 $(STAMP): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -27,6 +27,10 @@ $(PAGE): $(VIEWER)/package-lock.json $(wildcard $(VIEWER)/*.html $(VIEWER)/*.ts 
 	  $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[page]'
 	cd $(VIEWER) && PATH="$(abspath $(BIN)):$$PATH" && npm ci --no-audit --no-fund --loglevel=error && npm run --silent build
 	touch $@
+
+## help: what there is to make
+help:
+	@sed -n 's/^## //p' $(firstword $(MAKEFILE_LIST))
 
 ## page: build the web page that `wizen serve` shows at /; half a minute, and only when its sources changed
 page: $(PAGE)
@@ -100,10 +104,12 @@ lint: $(STAMP)
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+## format: style, mended
 format: $(STAMP)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
+## clean: remove the installation and what was built
 clean:
 	rm -rf $(VENV) build *.egg-info $(VIEWER)/node_modules $(VIEWER)/dist
 

@@ -323,15 +323,19 @@ class Solver:
         context: Context | None = None,
         steps: int | None = None,
     ) -> xr.Dataset:
-        """Relax a surface (n, 2n, 3) at a stage, for `steps` at most, and check what leaves as `solve` does.
+        """Relax a surface (n, 2n, 3) at a stage, for about `steps` at most, and check what leaves as `solve` does.
 
         Raises:
-            InvalidInput: this solver relaxes nothing, or the need cannot be met.
+            InvalidInput: this solver relaxes nothing, the need cannot be met, or the surface is not finite.
             SolverError: typed.
 
         """
         if self.relax is None:
             raise InvalidInput(f"{self.name} relaxes no surfaces.", advice="Run it: it finds its own.")
+        if not np.isfinite(position).all():
+            raise InvalidInput("the surface has points that are not finite.", advice="Give the position of a look-up.")
+        if steps is not None and steps < 1:
+            raise InvalidInput(f"steps = {steps} are none.", advice="Give one or more, or leave them out.")
         asked = (need or Need()).model_copy(update={"stages": (stage,)})
         settled = self.settle(asked, of=(params,))
         result = self.relax(params, position, stage, settled, context or Context(), steps)

@@ -2,7 +2,7 @@
 
 Table 2 has no peach and no pear: they take the apple's skin and rates. A fruit grows its own species at the speed that
 was measured; the same fruit as `...-paper` has the paper's climate, growth rates and transpiration coefficients, of
-which orange and peach are implausible: 9 and 18 % of the weight in a day (docs/decay.md).
+which orange and peach are implausible: 9 and 17 % of the weight in a day (docs/decay.md).
 """
 
 from __future__ import annotations

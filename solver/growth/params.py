@@ -71,7 +71,8 @@ class GrowthParams(Params):
         4.0,
         ge=0.2,
         le=50,
-        description="Length over width of a strip or triangle, height over radius of what is round, radii of a torus",
+        description="Length over width of a strip or triangle, height over radius of what is round, without the half "
+        "spheres that close a stem or capsule, radii of a torus",
         json_schema_extra=_units("1"),
     )
     tools: tuple[Tool, ...] = Field(

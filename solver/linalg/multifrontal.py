@@ -232,7 +232,12 @@ class _Elimination:
         self._open: dict[int, Floats] = {}
 
     def take(self, numbers: range, watch: Callable[[], None]) -> None:
-        """Eliminate fronts, whose children have been or are among them; watch: called before each."""
+        """Eliminate fronts, whose children have been or are among them; watch: called before each.
+
+        Raises:
+            numpy.linalg.LinAlgError: a front is exactly singular or, where it must be, not positive definite.
+
+        """
         analysis = self._analysis
         place = np.full(len(analysis.indptr) - 1, -1)
         for number in numbers:

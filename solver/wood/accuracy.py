@@ -5,7 +5,7 @@ error goes with the number of rods and not with the vertices, of which no qualit
 
     error = LARGEST (FEWEST / rods)^POWER
 
-bounds all runs in `benchmarks/results/wood-bundles.json` (version 11), a test. It is one of elastic forces at small
+bounds all runs in `benchmarks/results/wood-bundles.json`, a test. It is one of elastic forces at small
 loads: where something breaks, a branch is chaotic, and nothing is said.
 """
 

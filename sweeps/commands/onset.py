@@ -113,7 +113,7 @@ def _solver(name: str | None) -> Solver:
         return next(iter(able.values()))
     if name not in able:
         what = "several solvers know onsets" if name is None else f"--solver {name}: it knows no onset"
-        raise InvalidOption(f"{what}.", f"Say --solver and one of {', '.join(able)}.")
+        raise InvalidOption(f"{what}.", f"Name one of {', '.join(able)}.")
     return able[name]
 
 

@@ -271,6 +271,23 @@ def test_a_tolerance_beside_a_quality_is_refused(solver):
     assert solver.settle(settled) == settled
 
 
+@pytest.mark.parametrize(
+    ("position", "steps", "words"),
+    [
+        (
+            np.full((8, 16, 3), np.nan),
+            None,
+            "the surface has points that are not finite. Give the position of a look-up",
+        ),
+        (np.ones((8, 16, 3)), 0, "steps = 0 are none. Give one or more, or leave them out"),
+    ],
+)
+def test_what_cannot_be_relaxed_is_refused_before_any_work(position, steps, words):
+    solver = registry.get("dehydration")
+    with pytest.raises(InvalidInput, match=words):
+        solver.relaxed(small(solver)[0], position, 0.1, steps=steps)
+
+
 def test_a_field_of_the_whole_mesh_is_refused_beside_a_region():
     solver = registry.get("dehydration")
     with pytest.raises(InvalidInput, match="mesh_position is of the whole mesh"):

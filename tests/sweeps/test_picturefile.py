@@ -27,6 +27,19 @@ def test_a_picture_lies_around_the_body_as_maps_do(tmp_path: Path) -> None:
     assert params.light_map.bright == 2  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize("size", [(4, 2), (16, 8), (512, 256)])
+def test_a_pictures_left_edge_lies_at_x(size: tuple[int, int], tmp_path: Path) -> None:
+    """White from the left edge half-way around: the middle of that is a quarter turn on, whatever the size."""
+    wide, tall = size
+    pixels = np.zeros((tall, wide), np.uint8)
+    pixels[:, : wide // 2] = 255
+    Image.fromarray(pixels).save(tmp_path / "half.png")
+    rows = np.array(assignments([f"light_map=@{tmp_path}/half.png"])["light_map"])
+    turns = 2 * np.pi * np.arange(rows.shape[1]) / rows.shape[1]
+    middle = np.rad2deg(np.angle((rows.mean(axis=0) * np.exp(1j * turns)).sum()))
+    assert middle == pytest.approx(90, abs=1e-3)
+
+
 @pytest.mark.parametrize(("name", "data"), [("a.png", b"no picture"), ("b.jpg", b""), ("none.png", None)])
 def test_what_is_no_picture_is_refused(name: str, data: bytes | None, tmp_path: Path) -> None:
     if data is not None:

@@ -92,4 +92,4 @@ def table(record: Row) -> str:
         lines.append([f"{te:g}", f"{gamma:g}", "limit", "", "", limit, "", "", "", said])
     at = ", ".join(f"{s:g}" for s in STAGES)
     head = ("te", "gamma", "elements an edge", "elements", "seeds", f"roughness [r1] at s = {at}", "against the finest")
-    return markdown((*head, "seeds differ by at most", "CPU s", "order"), lines)
+    return markdown((*head, "standard deviation of seeds, at most", "CPU s", "order"), lines)

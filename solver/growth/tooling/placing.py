@@ -193,7 +193,12 @@ def _plane(normal: Floats, frame: Floats) -> tuple[Floats, Floats]:
 
 
 def about(apex: Apex, spots: Mapping[int, tuple[Spot, ...]], mesh: Mesh) -> Floats:
-    """Return the control points of a curve about an apex."""
+    """Return the control points of a curve about an apex.
+
+    Raises:
+        InvalidInput: it follows a tool that is no hot spot, or one that has not started.
+
+    """
     if apex.tool is not None:
         if not spots.get(apex.tool):
             raise InvalidInput(

@@ -160,6 +160,10 @@ def bonded(
 
     points (k, 2) in the section, s (k, n) places along, course (k, n, 3) [m] places in the straight bundle where fibres
     deviate, edge (k, n - 1) edge numbers, rest (v, 3) places at rest; log: what the bundle is hewn from.
+
+    Raises:
+        InvalidGeometry: two rods stand at one place.
+
     """
     outline = corners(log)
     near = params.reach * float(np.sqrt(area(outline) / len(points)))

@@ -34,7 +34,10 @@ def read(path: Path) -> list[list[float]]:
     grey, white, digits = _grey(path)
     tall, wide = grey.shape
     rows = min(_ROWS, tall, wide // 2)
-    found: list[list[float]] = (_averages(_averages(grey, rows).T, 2 * rows).T / white).round(digits).tolist()
+    # a map's first column stands at azimuth 0, which is the picture's left edge: half of it lies on either side
+    halves = _averages(_averages(grey, rows).T, 4 * rows)
+    columns = (np.roll(halves, 1, axis=0)[::2] + halves[::2]) / 2
+    found: list[list[float]] = (columns.T / white).round(digits).tolist()
     return found
 
 

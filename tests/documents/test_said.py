@@ -1,0 +1,132 @@
+"""Sentences that say what a table, a record, the command line or a law says: they say the same."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from collections import defaultdict
+from typing import Any
+
+import numpy as np
+import pytest
+import typer.main
+
+from benchmarks import figures
+from service.cli import app
+from solver.decay import SOLVER as DECAY
+from solver.decay import DecayParams
+from solver.decay.environment import water_lost
+from solver.decay.surfaces.surface import extent
+from solver.dehydration import SOLVER as DEHYDRATION
+from solver.dehydration.settings import choose
+
+from ._blocks import ROOT
+
+
+def _page(name: str) -> str:
+    """Return a page with its lines joined."""
+    return " ".join((ROOT / name).read_text(encoding="utf-8").split())
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="no make here")
+def test_make_help_names_all_that_there_is_to_make() -> None:
+    phony = re.search(r"^\.PHONY: (.*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+    assert phony
+    said = subprocess.run(["make", "help"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert set(phony[1].split()) == set(re.findall(r"^([a-z-]+): ", said, re.MULTILINE))
+
+
+def _commands(group: Any, before: str = "") -> dict[str, Any]:
+    """Return all commands by name, those of groups behind the group's."""
+    found: dict[str, Any] = {}
+    for name, command in group.commands.items():
+        found |= _commands(command, f"{name} ") if hasattr(command, "commands") else {before + name: command}
+    return found
+
+
+def test_the_readme_says_which_commands_print_no_json() -> None:
+    every = _commands(typer.main.get_command(app))
+    without = [name for name, command in every.items() if not any("--json" in one.opts for one in command.params)]
+    said = re.search(r"with `--json`, which all but ([^,]*(?:, [^,]*)* and `[^`]*`) take", _page("README.md"))
+    assert said
+    assert sorted(re.findall(r"`([^`]*)`", said[1])) == sorted(without)
+
+
+def test_the_readme_says_what_notebooks_import() -> None:
+    said = re.search(r"one file \(`pip install -e '\.\[([\w,]+)\]'`\)", _page("README.md"))
+    assert said
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    needed = [
+        *project["dependencies"],
+        *(one for e in said[1].split(",") for one in project["optional-dependencies"][e]),
+    ]
+    brought = {re.split(r"[^\w]", name)[0] for name in needed} | {"IPython"}  # ipykernel brings that
+    ours = set(sys.stdlib_module_names) | {"solver", "store", "sweeps", "service"}
+    for path in sorted((ROOT / "examples" / "notebooks").glob("*.ipynb")):
+        cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
+        code = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
+        assert set(re.findall(r"^(?:from|import) (\w+)", code, re.MULTILINE)) <= ours | brought, path.name
+
+
+def test_elements_of_each_quality_are_those_that_are_taken() -> None:
+    said = re.search(
+        r"at gamma 10 preview has (\d+) elements an edge, default (\d+), fine (\d+)", _page("docs/dehydration.md")
+    )
+    assert said
+    fruit = DEHYDRATION.parse({"te": 0.04, "gamma": 10})
+    assert [int(n) for n in said.groups()] == [choose(fruit, q).n for q in ("preview", "default", "fine")]
+
+
+def test_runs_whose_buckles_merge_are_counted_as_they_are() -> None:
+    record = figures.load("dehydration-buckled")
+    runs = [run for run in record["runs"] if run["version"] == record["version"]]
+    page = _page("docs/dehydration.md")
+    soft = [run["buckle_count"][-1] < run["buckle_count"][0] for run in runs if run["gamma"] == 10]
+    stiff = [run["buckle_count"][-1] < run["buckle_count"][0] for run in runs if run["gamma"] > 10]
+    assert all(soft)
+    assert f"in all {len(soft)} runs" in page
+    assert f"in {sum(stiff)} of {len(stiff)}, and there seeds" in page
+
+
+def test_seeds_differ_from_their_mean_by_what_is_said() -> None:
+    record = figures.load("dehydration-meshes")
+    meshes = defaultdict(list)
+    for run in record["runs"]:
+        if run["version"] == record["version"]:
+            meshes[run["gamma"], run["n"]].append(run["roughness"])
+    worst = defaultdict(float)
+    for (gamma, _), seeds in meshes.items():
+        worst[gamma] = max(worst[gamma], float(np.abs(np.array(seeds) / np.mean(seeds, axis=0) - 1).max()))
+    percent = {gamma: f"{100 * off:.0f}" for gamma, off in worst.items()}
+    said = f"by up to {percent[10]} % at gamma 10, {percent[30]} % at 30 and {percent[50]} % at 50"
+    assert said in _page("docs/dehydration.md")
+
+
+def test_slow_frames_of_painting_are_as_slow_as_is_said() -> None:
+    rows = figures.load("growth-painting")["table"]["rows"]
+    page = _page("docs/growth.md")
+    ratios = {(row[0], row[1]): float(row[3]) / float(row[2]) for row in rows}
+    small = {way: ratio for (what, way), ratio in ratios.items() if what == "leaf, 5000"}
+    assert max(ratio for (what, way), ratio in ratios.items() if what.endswith("5000") and way == "whole") <= 3
+    assert f"({small['whole']:.1f} times on the leaf; {small['active']:.1f} where parts are)" in page
+
+
+def test_what_fruits_lose_in_a_day_is_what_they_lose() -> None:
+    table = (ROOT / "docs" / "decay.md").read_text(encoding="utf-8").split("| fruit | Table 1's K |", 1)[1]
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")] for line in table.split("\n\n", 1)[0].splitlines()[2:]
+    ]
+    assert {row[0] for row in rows} == {"apple", "pear", "tomato", "orange", "peach"}
+    for fruit, printed, lost, here, then in rows:
+        own = DECAY.parse({}, fruit).transpiration
+        assert own == (float(printed) if here == "as printed" else float(here))
+        for coefficient, said in ((float(printed), lost), (own, then or lost)):
+            params = DECAY.parse({"transpiration": coefficient}, fruit)
+            assert isinstance(params, DecayParams)
+            share = water_lost(params, extent(params), 1.0)
+            digits = len(said.removesuffix(" %").partition(".")[2])
+            assert f"{100 * share:.{digits}f} %" == said
