@@ -8,7 +8,7 @@ root/ledger.sqlite          who computes what; can be rebuilt from the shards
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
@@ -157,10 +157,24 @@ class Store:
             if is_key(path.stem):
                 yield path.stem
 
-    def results(self) -> Iterator[xr.Dataset]:
-        """Yield all stored results that read well, in the order of their keys, one in memory at a time."""
-        for key in self.keys():
+    def results(self, keys: Iterable[str] | None = None) -> Iterator[xr.Dataset]:
+        """Yield all stored results (or those of `keys`) that read well, by key, one in memory at a time."""
+        for key in self.keys() if keys is None else keys:
             try:
                 yield self.get(key)
             except CorruptShard:
                 continue
+
+    def learn(self, keys: Iterable[str] | None = None) -> int:
+        """Let the ledger know of results that came without it: copied in, or from before it was lost; return how many.
+
+        All are looked at, or `keys`. Those that are damaged are passed over.
+
+        Raises:
+            StoreError: the ledger cannot be read, or is not to be written and lacks some.
+
+        """
+        if keys is None:
+            known = {job.key for state in ("done", "running") for job in self.ledger.jobs(state)}
+            keys = [key for key in self.keys() if key not in known]
+        return self.ledger.learn(self.results(keys))

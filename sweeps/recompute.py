@@ -58,6 +58,7 @@ def recompute(
     if not keys:
         yield Finding("run", table.name, "none of its runs is here: nothing was solved again. Run its plan again.")
         return
+    store.learn()  # where the ledger was lost
     drawn = np.random.default_rng(seed).permutation(len(keys))[:count]
     chosen = [keys[i] for i in sorted(drawn.tolist())]
     for key in chosen:

@@ -203,7 +203,7 @@ def _rows(path: Path, stamp: int) -> tuple[Row, ...]:
     """Return the rows of one shard, whose seal is checked first: on a damaged one HDF5 may hang."""
     import xarray as xr
 
-    advice = "`wizen table verify` looks closer; delete the file and run the same sweep again."
+    advice = "Delete the file and run the same sweep again; `wizen doctor --deep` looks at all there are."
     try:
         if not seal.is_whole(path):
             raise CorruptShard(f"{path} is damaged: its bytes are not those that were written.", advice)

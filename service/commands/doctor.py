@@ -81,6 +81,8 @@ def examine(settings: Settings, deep: bool = False) -> Iterator[Finding]:
     if place.state != "bad":
         yield _ledger(root)
     yield from _tables(root, deep)
+    if deep:
+        yield from _results(Store(root))
 
 
 def _installation() -> Finding:
@@ -198,11 +200,12 @@ def _ledger(root: Path) -> Finding:
             said = connection.execute("PRAGMA quick_check").fetchone()[0]
             version = connection.execute("PRAGMA user_version").fetchone()[0]
             counts = dict(connection.execute("SELECT state, count(*) FROM jobs GROUP BY state")) if said == "ok" else {}
+            done = connection.execute("SELECT key FROM jobs WHERE state = 'done'").fetchall() if counts else []
     except sqlite3.Error as error:
         if getattr(error, "sqlite_errorname", "").startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
             # nothing is known of what is in it
             return Finding("ledger", "bad", f"{path}: {error}", "Ask as the user whose store it is.")
-        said, counts, version = str(error), {}, 0
+        said, counts, version, done = str(error), {}, 0, []
     known = Store(root).ledger.database.version
     if version > known:
         advice = "Install the wizen that wrote it, or restore a backup from before."
@@ -210,7 +213,12 @@ def _ledger(root: Path) -> Finding:
     if said != "ok":
         advice = f"Delete {path}* (three files); `wizen sweep` makes it anew from the results that are stored."
         return Finding("ledger", "bad", said, advice)
-    return Finding("ledger", "good", ", ".join(f"{n} {state}" for state, n in counts.items()) or "empty")
+    told = ", ".join(f"{n} {state}" for state, n in counts.items()) or "empty"
+    gone = [key for (key,) in done if not Store(root).has(key)]
+    if gone:
+        advice = "Sweep their plans again, or restore the last backup, which keeps what it had."
+        return Finding("ledger", "note", f"{told}; the results of {len(gone)} that are done are not here", advice)
+    return Finding("ledger", "good", told)
 
 
 def _tables(root: Path, deep: bool) -> Iterator[Finding]:
@@ -224,8 +232,11 @@ def _tables(root: Path, deep: bool) -> Iterator[Finding]:
         except StoreError as error:
             yield Finding("tables", "bad", error.message, error.advice)
             continue
-        solver = registry.get(table.solver)
         said = f"{name}: {table.solver} {table.version}, {len(table.keys)} runs"
+        if table.solver not in registry.names():
+            yield Finding("tables", "bad", said, "Its solver is not installed: install it, or move the table away.")
+            continue
+        solver = registry.get(table.solver)
         anew = f"version {solver.version} of the solver is installed: sweep its plan again."
         if not solver.answers_from(table.version):
             yield Finding("tables", "bad", said, f"It is refused as stale; {anew}")
@@ -247,3 +258,17 @@ def _tables(root: Path, deep: bool) -> Iterator[Finding]:
                 yield Finding(
                     "bytes", "good", f"{name}: every byte is as it was written, and the runs can be had again"
                 )
+
+
+def _results(store: Store) -> Iterator[Finding]:
+    """Every result reads as it was written, whether a table holds it or not."""
+    count = damaged = 0
+    for key in iter(store.keys()):
+        count += 1
+        try:
+            store.get(key)
+        except StoreError as error:
+            damaged += 1
+            yield Finding("results", "bad", error.message, error.advice)
+    if not damaged:
+        yield Finding("results", "good", f"{count}, every byte as it was written")

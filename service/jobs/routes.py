@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from pathlib import Path as FilePath
 from typing import Annotated, Any
 from urllib.parse import urlencode
 
 from fastapi import APIRouter, Depends, Path, Query, Request, Response
 
-from store.errors import UnknownJob
+from store.errors import StoreError, UnknownJob
 from store.keys import is_key
 from store.ledger.jobs import Job
 from store.ledger.jobs import State as JobState
@@ -137,10 +138,17 @@ def stored_job(request: Request, key: str) -> Job:
         UnknownJob: nobody asked for it.
 
     """
-    ledger = ledger_of(request) if is_key(key) else None
-    if ledger is None:
-        raise UnknownJob(f"there is no job {key[:80]!r}.", "GET /v1/jobs lists all.")
-    return ledger.get(key)
+    if is_key(key):
+        store: Store = request.app.state.tables.store
+        ledger = ledger_of(request)
+        with suppress(UnknownJob):
+            if ledger is not None:
+                return ledger.get(key)
+        # a result that came without the ledger, copied in or from before it was lost: GET /v1/results lists it
+        with suppress(StoreError):
+            if store.has(key) and store.learn([key]):
+                return store.ledger.get(key)
+    raise UnknownJob(f"there is no job {key[:80]!r}.", "GET /v1/jobs lists all.")
 
 
 def check_done(job: Job) -> None:

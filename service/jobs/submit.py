@@ -92,6 +92,8 @@ def submit(
     lost = not store.has(spec.key)
     if lost:
         check_begun(store, spec.params)
+    # what was given up and is here all the same came from elsewhere: its run finds it
+    again = again or not lost
     job, new = Queue(store.ledger).ask(spec, owner, quota, again=again, lost=lost, expected=cost.seconds)
     return Submitted(job, new)
 

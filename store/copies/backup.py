@@ -5,8 +5,9 @@ plans, tokens) in a folder of its own for each copy, and a list of all files wit
 are immutable, so a later backup into the same directory copies only what is new, and anew what is not sound there. The
 list is written last: whatever is killed on the way, the backup before is still whole.
 
-The ledger is copied first, as SQLite sees it at one moment: what it calls done has its shard on the disk by then. A
-restored store appears at once, by a rename.
+The ledger is copied first, as SQLite sees it at one moment: what it calls done has its shard on the disk by then. What
+it calls done and the store has lost since stays in the backup, where that has it. A restored store appears at once, by
+a rename.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import secrets
 import shutil
 import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -39,17 +40,25 @@ _CHANGING = "changing"
 _CHANGES = ("tables/*/scalars.nc", "tables/*/current.json", "plans/*.toml", "tokens.json")
 _STAYS = ("shards/??/*.h5", "tables/*/*.h5")
 _PRIVATE = ("tokens.json",)
+_SEALED = (".h5", ".nc")
 #: A claim means nothing after a restore: its worker belongs to the other store.
 _FREE = "UPDATE jobs SET state = 'wanted', worker = NULL, lease_until = NULL, progress = 0 WHERE state = 'running'"
 
 
 class Copied(NamedTuple):
-    """What a copy holds, and what of it had to be copied."""
+    """What a copy holds, and what of it had to be copied.
+
+    `damaged` are files that were damaged already when they were copied, `kept` those that the store has lost and the
+    backup before still had, `gone` the keys of results that the ledger calls done and nobody has.
+    """
 
     files: int
     bytes: int
     new: int
     created: str
+    damaged: tuple[str, ...] = ()
+    kept: tuple[str, ...] = ()
+    gone: tuple[str, ...] = ()
 
 
 def backup(store: Store, to: Path) -> Copied:
@@ -69,21 +78,29 @@ def backup(store: Store, to: Path) -> Copied:
         now = datetime.now(UTC)
         changing = f"{_CHANGING}/{now:%Y%m%dT%H%M%S}-{secrets.token_hex(4)}"
         seal.make_directory(to / changing)  # of a store in which nothing changes it stays empty
-        files = {_LEDGER: _copy_ledger(store, to, f"{changing}/{_LEDGER}")} if store.ledger.path.is_file() else {}
-        new = 0
+        files, done = {}, list[str]()
+        if store.ledger.path.is_file():
+            files[_LEDGER], done = _copy_ledger(store, to, f"{changing}/{_LEDGER}")
+        new, damaged = 0, list[str]()
         # what changes first, then what there is by now: the generation that a manifest names is among it
         for patterns in (_CHANGES, _STAYS):
             for name in sorted(_names(store.root, patterns)):
                 at = name if patterns is _STAYS else f"{changing}/{name}"
                 files[name], copied = _copy(store.root / name, to, at, known.get(name), private=name in _PRIVATE)
                 new += copied
+                if copied and at.endswith(_SEALED) and not seal.is_whole(to / at):
+                    damaged.append(name)
+        kept = {name: known[name] for name in _lost(to / changing, files, done) if _has(to, known.get(name))}
+        files |= kept
         _check_tables(store.root, to / changing, files)
         page: dict[str, Any] = {"wizen": __version__, "created": now.isoformat(timespec="seconds"), "files": files}
         seal.publish(to / _LIST, json.dumps(page, indent=1).encode())
         for old in (to / _CHANGING).iterdir():
             if old.name != Path(changing).name:
                 shutil.rmtree(old)
-    return Copied(len(files), sum(entry["bytes"] for entry in files.values()), new, page["created"])
+    gone = tuple(key for key in done if _shard(key) not in files)
+    size = sum(entry["bytes"] for entry in files.values())
+    return Copied(len(files), size, new, page["created"], tuple(damaged), tuple(kept), gone)
 
 
 def restore(source: Path, root: Path) -> Copied:
@@ -186,6 +203,27 @@ def _listed(source: Path) -> dict[str, Any]:
         raise CorruptBackup(f"{source / _LIST} is damaged ({error}).", "Take another backup.") from error
 
 
+def _shard(key: str) -> str:
+    return f"shards/{key[:2]}/{key}.h5"
+
+
+def _lost(changing: Path, files: Mapping[str, Any], done: Sequence[str]) -> Iterator[str]:
+    """Yield the results that a copied ledger calls done, and current generations of tables, that were not copied."""
+    for page in changing.glob("tables/*/current.json"):
+        with suppress(CorruptTable, UnknownTable):
+            name = f"tables/{page.parent.name}/{read_manifest(changing / 'tables', page.parent.name).file}"
+            if name not in files:
+                yield name
+    for key in done:
+        if _shard(key) not in files:
+            yield _shard(key)
+
+
+def _has(to: Path, known: Mapping[str, Any] | None) -> bool:
+    """Return whether a backup holds what its list before said of a file."""
+    return known is not None and _is_sound(to / known["at"], known)
+
+
 def _check_tables(root: Path, changing: Path, files: Mapping[str, Any]) -> None:
     """Refuse a copy in whose making a generation was pruned; a table that is damaged in the store is so in the copy.
 
@@ -250,8 +288,8 @@ def _is_no_better(source: Path, known: Mapping[str, Any]) -> bool:
     return source.stat().st_size == known["bytes"] or not seal.is_whole(source)
 
 
-def _copy_ledger(store: Store, root: Path, at: str) -> dict[str, Any]:
-    """Copy the ledger as it is at one moment, with no job claimed.
+def _copy_ledger(store: Store, root: Path, at: str) -> tuple[dict[str, Any], list[str]]:
+    """Copy the ledger as it is at one moment, with no job claimed; return what is listed of it, and what it calls done.
 
     Raises:
         CorruptLedger: it cannot be read.
@@ -265,6 +303,7 @@ def _copy_ledger(store: Store, root: Path, at: str) -> dict[str, Any]:
             source.backup(copy)
             copy.execute(_FREE)
             copy.commit()
+            done = [str(key) for (key,) in copy.execute("SELECT key FROM jobs WHERE state = 'done' ORDER BY key")]
             data = copy.serialize()
     except sqlite3.DatabaseError as error:
         if getattr(error, "sqlite_errorname", "").startswith(("SQLITE_FULL", "SQLITE_IOERR")):
@@ -272,4 +311,4 @@ def _copy_ledger(store: Store, root: Path, at: str) -> dict[str, Any]:
         advice = "`wizen doctor` says what is wrong with it. Who may not write there cannot read it while it is in use."
         raise CorruptLedger(f"{path} cannot be read ({error}).", advice) from error
     seal.publish(root / at, data)
-    return {"at": at, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+    return {"at": at, "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}, done

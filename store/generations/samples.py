@@ -128,10 +128,8 @@ def finished(store: Store, solver: str, choice: Choice, fits: Callable[[Job], bo
 
     """
     plan, quality, version, keys = choice
+    store.learn()  # a table of some of what is here would not say so
     jobs = _named(store, solver, keys) if keys is not None else _done(store, solver, plan)
-    if not jobs and plan is None:
-        store.ledger.rebuild(store.results())
-        jobs = _done(store, solver, plan)
     # relaxed blends of a table are no samples of one
     jobs = [job for job in jobs if job.need.get("start") is None]
     jobs = [j for j in jobs if fits(j) and quality in (None, j.need["quality"]) and version in (None, j.version)]
@@ -171,9 +169,6 @@ def _done(store: Store, solver: str, plan: str | None) -> list[Job]:
 
 def _named(store: Store, solver: str, keys: Collection[str]) -> list[Job]:
     missing = set(keys) - {job.key for job in _done(store, solver, None)}
-    if missing:
-        store.ledger.rebuild(store.results())
-        missing = set(keys) - {job.key for job in _done(store, solver, None)}
     if missing:
         raise UnknownJob(
             f"{len(missing)} of the table's {len(keys)} results are gone, {min(missing)} first.",

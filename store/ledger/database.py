@@ -10,7 +10,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from .. import seal
-from ..errors import CorruptLedger, ReadOnlyStore, StorageFailed, StorageFull
+from ..errors import CorruptLedger, MissingStore, ReadOnlyStore, StorageFailed, StorageFull
 from .filesystem import refuse_network
 
 __all__ = ["Database", "ask_the_system", "readable"]
@@ -36,6 +36,15 @@ def readable(path: Path) -> str:
 def _guarded(path: Path) -> bool:
     """Return whether a file lies where we may not write beside it: another's directory, or a disk that is read only."""
     return not os.access(path.parent, os.W_OK, effective_ids=os.access in os.supports_effective_ids)
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """Return what tells a file from another one of its name; None where there is none."""
+    try:
+        status = path.stat()
+    except FileNotFoundError:
+        return None
+    return status.st_dev, status.st_ino
 
 
 def ask_the_system(path: Path) -> None:
@@ -65,6 +74,7 @@ class Database:
         self._pid = os.getpid()
         self._lock = threading.RLock()
         self._connection: sqlite3.Connection | None = None
+        self._file: tuple[int, int] | None = None
 
     def close(self) -> None:
         """Close the connection; the next use opens it again."""
@@ -91,6 +101,7 @@ class Database:
             ReadOnlyStore: it may not be written, and is of an earlier version or in use.
             NetworkFileSystem: it is where locks do not hold.
             StorageFailed: the disk does not work, or another program keeps the file locked.
+            MissingStore: the directory that it was in is gone.
 
         """
         with self._transaction("DEFERRED") as connection:
@@ -105,6 +116,7 @@ class Database:
             ReadOnlyStore: it may not be written.
             StorageFull: the disk is full.
             StorageFailed: it does not work, or another program keeps the file locked.
+            MissingStore: the directory that it was in is gone.
 
         """
         with self._transaction("IMMEDIATE") as connection:
@@ -113,6 +125,7 @@ class Database:
     @contextmanager
     def _transaction(self, kind: str) -> Iterator[sqlite3.Connection]:
         with self._own_lock(), self._typed():
+            self._keep_up()
             if kind == "DEFERRED" and self._connection is None and self._path.is_file() and _guarded(self._path):
                 with closing(self._look()) as connection:
                     yield connection
@@ -126,6 +139,11 @@ class Database:
                 if connection.in_transaction:
                     connection.execute("ROLLBACK")
                 raise
+
+    def _keep_up(self) -> None:
+        """Let go of a file that was deleted, or put away for a restored store: what is written to it nobody reads."""
+        if self._connection is not None and self._file not in (None, _identity(self._path)):
+            self.close()
 
     def _own_lock(self) -> threading.RLock:
         if self._pid != os.getpid():
@@ -154,7 +172,9 @@ class Database:
 
     def _open(self) -> sqlite3.Connection:
         refuse_network(self._path)
-        self._path.parent.mkdir(parents=True, exist_ok=True)
+        root = self._path.parent.absolute()
+        if not root.is_dir():  # a store is begun by who opens it, and this one was moved away
+            raise MissingStore(f"there is no store in {root}.", "Put it back, or name where it is now.")
         connection = sqlite3.connect(self._path, timeout=_PATIENCE, isolation_level=None, check_same_thread=False)
         try:
             connection.row_factory = sqlite3.Row
@@ -173,7 +193,7 @@ class Database:
         except BaseException:
             connection.close()
             raise
-        self._connection = connection
+        self._connection, self._file = connection, _identity(self._path)
         return connection
 
     @contextmanager

@@ -16,11 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..canonical import canonical
+from ..errors import UnknownJob
 from .clock import Clock
 from .database import Database
 from .jobs import STATES, Job, JobSpec, State, read_row
 from .leases import Leases
-from .recovery import rebuild
+from .recovery import learn, rebuild
 from .rows import SELECT, among, enter, get
 from .schema import SCHEMA, UPGRADES
 
@@ -135,7 +136,10 @@ class Ledger:
         done before stays done. None means that the job is no longer its claimant's, and is left alone.
         """
         with self.database.write() as connection:
-            found = get(connection, job.key)
+            try:
+                found = get(connection, job.key)
+            except UnknownJob:  # this ledger was begun after the claim
+                return None
             if found.state == "done" and found.claims == job.claims:
                 return "done"
             # a claimant that was lost has not failed: only MAX_LOST of those give a job up
@@ -221,6 +225,10 @@ class Ledger:
         Each result becomes a done job; a job noted as done whose result is not among them waits again.
         """
         return rebuild(self.database, results)
+
+    def learn(self, results: Iterable[xr.Dataset]) -> int:
+        """Note results as done that are not, and are nobody's; return how many. All else stays as it is."""
+        return learn(self.database, results)
 
     def _end(self, job: Job, change: str, *values: Any, only: str = "1") -> bool:
         """Apply `change` to a job that is still as `job`, the claim, says; return whether it is."""

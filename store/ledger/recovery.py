@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterable
+from sqlite3 import Connection
 from typing import TYPE_CHECKING
 
 from ..canonical import canonical
@@ -13,7 +14,7 @@ from .database import Database
 if TYPE_CHECKING:
     import xarray as xr
 
-__all__ = ["rebuild"]
+__all__ = ["learn", "rebuild"]
 
 
 def rebuild(database: Database, results: Iterable[xr.Dataset]) -> int:
@@ -28,28 +29,9 @@ def rebuild(database: Database, results: Iterable[xr.Dataset]) -> int:
         }
     count = 0
     for dataset in results:
-        attrs, now = dataset.attrs, time.time()
-        key = attrs["key"]
-        seconds = float(dataset["seconds"].max()) if "seconds" in dataset else None
         with database.write() as connection:
-            connection.execute(
-                "INSERT INTO jobs (key, solver, version, params, need, state, digest, seconds, created, updated, "
-                "progress) VALUES (?, ?, ?, ?, ?, 'done', ?, ?, ?, ?, 1) ON CONFLICT (key) DO UPDATE SET "
-                "state = 'done', digest = excluded.digest, error = NULL, worker = NULL, lease_until = NULL, "
-                "progress = 1, updated = excluded.updated",
-                (
-                    key,
-                    str(attrs.get("solver", "")),
-                    str(attrs.get("solver_version", "")),
-                    canonical(json.loads(attrs.get("params", "{}"))).decode(),
-                    canonical(json.loads(attrs.get("need", "{}"))).decode(),
-                    attrs["digest"],
-                    seconds,
-                    now,
-                    now,
-                ),
-            )
-        gone.pop(key, None)
+            _note(connection, dataset)
+        gone.pop(dataset.attrs["key"], None)
         count += 1
     with database.write() as connection:
         connection.executemany(
@@ -58,3 +40,34 @@ def rebuild(database: Database, results: Iterable[xr.Dataset]) -> int:
             [(time.time(), *claim) for claim in gone.items()],
         )
     return count
+
+
+def learn(database: Database, results: Iterable[xr.Dataset]) -> int:
+    """Let a ledger's file know of results that came without it; return how many. What runs is its worker's to end."""
+    count = 0
+    for dataset in results:
+        with database.write() as connection:
+            count += _note(connection, dataset, "WHERE state NOT IN ('running', 'done')")
+    return count
+
+
+def _note(connection: Connection, dataset: xr.Dataset, only: str = "") -> int:
+    """Enter a result as a done job, within a transaction; return how many were."""
+    attrs, now = dataset.attrs, time.time()
+    return connection.execute(
+        "INSERT INTO jobs (key, solver, version, params, need, state, digest, seconds, created, updated, "
+        "progress) VALUES (?, ?, ?, ?, ?, 'done', ?, ?, ?, ?, 1) ON CONFLICT (key) DO UPDATE SET "
+        "state = 'done', digest = excluded.digest, error = NULL, worker = NULL, lease_until = NULL, "
+        f"progress = 1, updated = excluded.updated {only}",
+        (
+            attrs["key"],
+            str(attrs.get("solver", "")),
+            str(attrs.get("solver_version", "")),
+            canonical(json.loads(attrs.get("params", "{}"))).decode(),
+            canonical(json.loads(attrs.get("need", "{}"))).decode(),
+            attrs["digest"],
+            float(dataset["seconds"].max()) if "seconds" in dataset else None,
+            now,
+            now,
+        ),
+    ).rowcount

@@ -1,4 +1,4 @@
-"""The commands that keep tables: rebuild, verify and compare. No finite-element run is needed but for spot checks."""
+"""The commands that keep tables: rebuild, verify, compare, prune. No run is needed but for spot checks."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ def add_to(table_app: typer.Typer) -> None:
     table_app.command()(rebuild)
     table_app.command()(verify)
     table_app.command()(compare)
+    table_app.command()(prune)
 
 
 def rebuild(
@@ -215,6 +216,29 @@ def compare(
             grid(console, ["B against A", "s", "rms", "max", "units"], numbers)
 
     emit(found.to_json(), as_json, show)
+
+
+def prune(store: StorePath, name: TableName = "default", as_json: As_json = False) -> None:
+    """Delete the generations of a table that are not current. Whoever has one open keeps it until it is closed.
+
+    Each build, rebuild and round of `wizen refine` leaves one behind, for `wizen table compare`.
+
+    [bold]Examples[/bold]
+
+    wizen table prune --store demo
+    """
+    from store import starter, tables
+    from store.manifest import directory
+    from store.store import Store
+
+    starter.check_own(store)
+    opened = Store.open(store)
+    sizes = {path: path.stat().st_size for path in directory(opened.tables_dir, name).glob("*.h5")}
+    gone = tables.prune(opened, name)
+    freed = sum(sizes.get(path, 0) for path in gone)
+    document = {"table": name, "deleted": [path.name for path in gone], "bytes": freed}
+    said = f"table {name}: {len(gone)} old generations deleted, {_size(freed)}"
+    emit(document, as_json, lambda console: console.print(said, markup=False))
 
 
 def _generation(text: str, store: Path | None, name: str) -> Path:

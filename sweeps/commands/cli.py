@@ -6,7 +6,7 @@ Nothing heavy is imported before a command runs: `wizen --help` must answer at o
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -28,9 +28,7 @@ from .terminal.options import (
     Most_seconds,
     StorePath,
 )
-
-if TYPE_CHECKING:
-    pass
+from .terminal.tables import begin_store
 
 __all__ = ["app"]
 
@@ -90,8 +88,6 @@ def sweep(
 
     wizen sweep big.toml --store /shared/fruits --scheduler tcp://10.0.0.1:8786
     """
-    from store.store import Store
-
     from ..planning.afford import afford
     from ..planning.plan import Plan
     from ..running import executors
@@ -99,12 +95,12 @@ def sweep(
     from .terminal import progress
     from .terminal.words import readers, report_document, show_report
 
-    read = Plan.load(plan)
+    read, text = Plan.read(plan)
     if max_seconds is not None:
-        afford(read, store, max_seconds, scheduler)
+        afford(read, store, max_seconds, scheduler, workers or 1)
     with executors.choose(workers, dask, scheduler) as pool:
-        opened = Store.open(store, create=True)
-        opened.keep_plan(read.name, plan.read_text(encoding="utf-8"))
+        opened = begin_store(store)
+        opened.keep_plan(read.name, text)
         left_out = f", {read.skipped} impossible ones left out" if read.skipped else ""
         note(f"{read.name}: {len(read.samples)} jobs on {pool.title}{left_out}")
         with progress.stopping(progress.GIVEN_BACK) as stop:
@@ -139,6 +135,7 @@ def status(store: StorePath, as_json: As_json = False) -> None:
     from store import scalars
     from store.store import Store
 
+    from ..running.place import is_lost
     from .terminal.words import failed as told
 
     opened = Store.open(store)
@@ -148,7 +145,10 @@ def status(store: StorePath, as_json: As_json = False) -> None:
         "store": str(store),
         "jobs": counts,
         "results": len(list(opened.keys())),
-        "running": [{"key": j.key, "plan": j.plan, "worker": j.worker, "progress": j.progress} for j in running],
+        "running": [
+            {"key": j.key, "plan": j.plan, "worker": j.worker, "progress": j.progress, "lost": is_lost(j)}
+            for j in running
+        ],
         "failed": [{"key": j.key, "plan": j.plan, "params": dict(j.params), "error": j.error} for j in failed],
         "tables": (shapes := opened.table_names()),
         "scalars": (tabulated := scalars.names(opened)),
@@ -157,7 +157,8 @@ def status(store: StorePath, as_json: As_json = False) -> None:
     def show(console: Any) -> None:
         grid(console, list(counts), [[str(count) for count in counts.values()]], f"jobs in {store}")
         for j in running:
-            console.print(f"running {j.key[:12]} {j.progress:4.0%} {j.plan}", markup=False)
+            gone = ": its runner is gone, the next one goes on with it" if is_lost(j) else ""
+            console.print(f"running {j.key[:12]} {j.progress:4.0%} {j.plan}{gone}", markup=False)
         for j in failed:
             console.print(f"failed  {told(j.key, j.plan, j.error or {}, store)}", markup=False)
         console.print(

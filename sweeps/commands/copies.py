@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from .terminal.console import emit
+from .terminal.console import emit, note
 from .terminal.options import As_json, StorePath
 
 __all__ = ["add_to"]
@@ -26,7 +28,8 @@ def backup(
 ) -> None:
     """Copy a store: results, tables, tokens and the ledger of jobs. It may be in use meanwhile.
 
-    A second backup into the same directory copies what is new. `wizen restore` brings it back.
+    A second backup into the same directory copies what is new. `wizen restore` brings it back. Files that were damaged
+    already are named, and the exit code is 1 then.
 
     [bold]Examples[/bold]
 
@@ -41,6 +44,14 @@ def backup(
         as_json,
         lambda console: _show(console, copied, to),
     )
+    for name in copied.damaged:
+        note(f"damaged already in the store: {name}; delete it there, and make it again")
+    if copied.kept:
+        note(f"the store has lost what the backup before had, and this one keeps: {_some(copied.kept)}")
+    if copied.gone:
+        note(f"the ledger calls done what neither has: {_some(copied.gone)}; sweep their plans again")
+    if copied.damaged:
+        raise typer.Exit(1)
 
 
 def restore(
@@ -55,6 +66,8 @@ def restore(
     wizen restore /backups/fruits --store fruits-again
     """
     from store.copies.backup import restore as bring_back
+    from store.errors import CorruptTokens
+    from store.tokens import Tokens
 
     copied = bring_back(source, store)
     emit(
@@ -62,6 +75,16 @@ def restore(
         as_json,
         lambda console: _show(console, copied, store),
     )
+    with suppress(CorruptTokens):  # they were so in the store, and stop no restore
+        tokens = ", ".join(token.name for token in Tokens(store).all() if not token.expired)
+        if tokens:
+            note(f"good as on {copied.created} are the tokens {tokens}: revoke again those that were revoked since")
+
+
+def _some(names: Sequence[str]) -> str:
+    """Return the first few of many names."""
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return f"{', '.join(names[:3])}{more}"
 
 
 def _show(console: Any, copied: Any, where: Path) -> None:

@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import re
 import time
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InvalidOption
 from .terminal.console import emit, grid, note
 from .terminal.options import As_json, StorePath
+from .terminal.tables import begin_store
+
+if TYPE_CHECKING:
+    from store.ledger.asks import Ask
+    from store.store import Store
+
+    from ..running.report import Event
 
 __all__ = ["add_to"]
 
@@ -40,7 +47,8 @@ def work(
 ) -> None:
     """Run the jobs that were asked for over HTTP, as they come. Stop it at any time; any number may run at once.
 
-    A service with WIZEN_JOBS_WORKERS=0 leaves all jobs to such workers.
+    A service with WIZEN_JOBS_WORKERS=0 leaves all jobs to such workers. With --until-empty the exit code is 1 if a job
+    was given up.
 
     [bold]Examples[/bold]
 
@@ -51,19 +59,31 @@ def work(
     import math
 
     from store.starter import check_own
-    from store.store import Store
 
     from ..running import executors
     from ..running.runner import run_queue
     from .terminal import progress
+    from .terminal.words import failed as told
+
+    given_up: list[str] = []
+
+    def observe(event: Event) -> None:
+        if event.kind == "done":
+            note(f"{event.key[:12]} solved in {event.seconds:.1f} s")
+        elif event.kind == "failed":
+            given_up.append(event.key)
+            note(f"failed {told(event.key, '', event.error or {}, store)}")
 
     check_own(store)
     with executors.choose(workers, scheduler=scheduler) as pool, progress.stopping(progress.GIVEN_BACK) as stop:
         note(f"working for {store} on {pool.title}")
-        solved = run_queue(Store.open(store, create=True), pool, stop, 0.0 if until_empty else math.inf)
-    emit({"solved": solved}, as_json, lambda console: console.print(f"{solved} solved"))
+        solved = run_queue(begin_store(store), pool, stop, 0.0 if until_empty else math.inf, observe)
+    said = f"{solved} solved" + (f", {len(given_up)} failed" if given_up else "")
+    emit({"solved": solved, "failed": given_up}, as_json, lambda console: console.print(said))
     if stop.is_set():
         raise typer.Exit(130)
+    if given_up:
+        raise typer.Exit(1)
 
 
 def audit(
@@ -80,12 +100,13 @@ def audit(
 
     wizen audit --store demo --token studio --json
     """
-    from store.ledger.asks import asks
     from store.store import Store
 
     opened = Store.open(store)
     start = 0.0 if since is None else time.time() - _span(since, "--since")
-    found = asks(opened.ledger.database, start, token) if opened.ledger.path.is_file() else []
+    found = _asks(opened, start, token)
+    if token is not None and not found:
+        _check_known(opened, token)
     rows = [{**ask._asdict(), "at": _date(ask.at)} for ask in found]
 
     def show(console: Any) -> None:
@@ -96,6 +117,29 @@ def audit(
         grid(console, ("asked", "token", "from", "job", "solver", "state", "seconds"), cells)
 
     emit({"asks": rows}, as_json, show)
+
+
+def _asks(store: Store, since: float = 0.0, token: str | None = None) -> list[Ask]:
+    """Return who asked for what; looking begins no ledger."""
+    from store.ledger.asks import asks
+
+    return asks(store.ledger.database, since, token) if store.ledger.path.is_file() else []
+
+
+def _check_known(store: Store, token: str) -> None:
+    """Refuse a token that neither is one nor ever asked for anything: revoked ones stay in the audit.
+
+    Raises:
+        UnknownToken: saying which are known.
+
+    """
+    from store.errors import UnknownToken
+    from store.tokens import Tokens
+
+    ids = {ask.token: ask.name for ask in _asks(store)} | {one.id: one.name for one in Tokens(store.root).all()}
+    if token not in (*ids, *ids.values()):
+        known = ", ".join(sorted({name or id for id, name in ids.items()}))
+        raise UnknownToken(f"there is and was no token {token!r}.", f"Known: {known or 'none'}.")
 
 
 def _took(row: dict[str, Any]) -> str:
@@ -118,12 +162,11 @@ def create(
 
     wizen token create --store demo --name studio --scopes run --expires 90d
     """
-    from store.store import Store
     from store.tokens import Tokens
 
     wanted: Any = [part for part in re.split(r"[,\s]+", scopes) if part]
     seconds = None if expires is None else _span(expires, "--expires")
-    token, secret = Tokens(Store.open(store, create=True).root).create(name, wanted, seconds)
+    token, secret = Tokens(begin_store(store).root).create(name, wanted, seconds)
     note(f"token {token.name!r} for {', '.join(token.scopes)}; the secret is not shown again:")
     emit({**_row(token), "secret": secret}, as_json, lambda console: console.print(secret, markup=False))
 

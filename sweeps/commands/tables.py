@@ -169,7 +169,7 @@ def plan_(name: Annotated[str, typer.Argument(help="Name of the table.")], store
 
     [bold]Examples[/bold]
 
-    wizen table plan sphere > sphere.toml
+    wizen table plan sphere-02 > sphere.toml
     """
     from store import tables
     from store.errors import UnknownTable
@@ -215,10 +215,8 @@ def _only_solver(store: Store, plan: str | None) -> str:
     """
     from store.errors import EmptyTable
 
+    store.learn()
     found = {job.solver for job in store.ledger.jobs("done", plan)}
-    if not found and plan is None:
-        store.ledger.rebuild(store.results())
-        found = {job.solver for job in store.ledger.jobs("done", plan)}
     if not found:
         where = f"plan {plan!r} has" if plan else "the store holds"
         raise EmptyTable(f"{where} no finished run to build a table from.", "Run a sweep first: wizen sweep PLAN.")
@@ -254,8 +252,7 @@ def _plan(store: Store, plan: str | None) -> tuple[Plan | None, str]:
         return None, store.plan(plan) if plan is not None else ""
     from ..planning.plan import Plan
 
-    path = Path(plan)
-    return Plan.load(path), path.read_text(encoding="utf-8")
+    return Plan.read(plan)
 
 
 def _show_table(table: Any, path: Path, as_json: bool, numbers: dict[str, Any] | None) -> None:

@@ -68,8 +68,19 @@ class Plan:
             PlanError: anything wrong in it, with the place and what to change.
 
         """
+        return cls.read(path)[0]
+
+    @classmethod
+    def read(cls, path: Path | str) -> tuple[Self, str]:
+        """Read a plan file; return the plan, and its text as it is written.
+
+        Raises:
+            PlanError: anything wrong in it, with the place and what to change.
+
+        """
         path = Path(path)
-        return cls.parse(planfile.load(path), name=path.stem)
+        tables, text = planfile.load(path)
+        return cls.parse(tables, name=path.stem), text
 
     @classmethod
     def parse(cls, tables: Mapping[str, Any], name: str = "plan") -> Self:

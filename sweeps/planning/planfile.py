@@ -110,15 +110,16 @@ class PlanFile(_Strict):
         return self
 
 
-def load(path: Path) -> dict[str, Any]:
-    """Return the tables of a TOML file.
+def load(path: Path) -> tuple[dict[str, Any], str]:
+    """Return the tables of a TOML file, and its text, which a pipe gives once.
 
     Raises:
         PlanError: no such file, or no TOML.
 
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        return tomllib.loads(text), text
     except FileNotFoundError:
         raise PlanError(f"there is no plan {path}.", "examples/ holds plans to start from.") from None
     except OSError as error:

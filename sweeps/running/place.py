@@ -15,8 +15,9 @@ from functools import cache
 from pathlib import Path
 
 from store.ledger.clock import Clock
+from store.ledger.jobs import Job
 
-__all__ = ["Place"]
+__all__ = ["Place", "is_lost"]
 
 #: Between the parts of a name; a host's name has none.
 _BETWEEN = ":"
@@ -57,6 +58,13 @@ class Place:
             case [_, self.boot, self.namespace, pid, _] if pid.isdecimal():
                 return not self.exists(int(pid))
         return False
+
+
+def is_lost(job: Job) -> bool:
+    """Return whether nobody runs a running job any more, as far as can be told here: its next runner takes it over."""
+    clock = Clock.of_host()
+    late = job.clock == clock.name and job.lease_until is not None and job.lease_until < clock.now()
+    return late or Place.here().knows_dead(job.worker)
 
 
 @cache

@@ -9,9 +9,11 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from contextlib import suppress
 from typing import Any
 
 from store import shards
+from store.errors import StoreError, UnknownJob
 from store.ledger.jobs import Job, JobSpec
 from store.ledger.queue import Queue
 from store.store import Store
@@ -72,7 +74,10 @@ class Run:
         while not self._stop.is_set():
             self._launch()
             if not self.flying and not self._elsewhere():
-                return
+                if len(self._states()) == len(self._jobs):
+                    return
+                self._prepare(again)  # somebody deleted the ledger meanwhile
+                continue
             yield self._pause
             self._collect()
             self._attend()
@@ -103,7 +108,8 @@ class Run:
         """Give back what still runs and wait for its workers; those that do not stop in time are ended."""
         for future, job in self.flying.items():
             future.cancel()
-            self._ledger.release(job)
+            with suppress(StoreError):  # what cannot be noted now is free when its lease has run out
+                self._ledger.release(job)
             self._call_off(future, job)
         until = self._now() + _LANDING
         while (patience := until - self._now()) > 0 and not all(future.done() for future in self.flying):
@@ -133,6 +139,10 @@ class Run:
         before = self._states()
         if any(job.state == "done" and not self._store.has(job.key) for job in before.values()):
             self._ledger.rebuild(self._store.results())  # shards were deleted by hand
+            before = self._states()
+        # of what was given up, another store's results may have been copied in since
+        here = [job for job in before.values() if job.state == "failed" and self._store.has(job.key)]
+        if here and self._ledger.want(here, self._name, again=True):
             before = self._states()
         if self._free(before.values()):
             before = self._states()  # what took its runners down too often was given up
@@ -240,9 +250,10 @@ class Run:
         found = {job.key: job for job in self._ledger.running(self.id)}
         held = {}
         for job in self.flying.values():
-            now = found.get(job.key) or self._ledger.get(job.key)
-            if now.claims == job.claims and now.state in ("running", "done"):
-                held[job.key] = now
+            with suppress(UnknownJob):  # somebody deleted the ledger meanwhile
+                now = found.get(job.key) or self._ledger.get(job.key)
+                if now.claims == job.claims and now.state in ("running", "done"):
+                    held[job.key] = now
         return held
 
     def _call_off(self, future: Future[Outcome], job: Job) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import shutil
 import socket
 import sqlite3
 from pathlib import Path
@@ -94,6 +95,28 @@ def test_a_broken_ledger_and_a_flipped_byte(own: Store, port: int) -> None:
         assert found(own.root, port, deep=True)["bytes"].state == "bad"
         for name in ("ledger.sqlite", "ledger.sqlite-wal", "ledger.sqlite-shm"):
             (own.root / name).unlink(missing_ok=True)  # as advised
+
+
+def test_a_damaged_result_that_no_table_holds_is_found(own: Store, port: int) -> None:
+    assert found(own.root, port, deep=True)["results"].state == "good"
+    for path in own.tables_dir.iterdir():
+        shutil.rmtree(path)
+    path = own.shard_path(next(own.keys()))
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 1
+    path.write_bytes(data)
+    assert "results" not in found(own.root, port)
+    seen = found(own.root, port, deep=True)["results"]
+    assert (seen.state, str(path) in seen.seen, "Delete the file" in seen.advice) == ("bad", True, True)
+    path.unlink()
+    seen = found(own.root, port)["ledger"]
+    assert (seen.state, "results of 1 that are done are not here" in seen.seen) == ("note", True)
+
+
+def test_a_table_whose_solver_is_gone_is_said(own: Store, port: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(registry, "names", lambda: ["wood"])
+    seen = found(own.root, port)["tables"]
+    assert (seen.state, "not installed" in seen.advice) == ("bad", True)
 
 
 def test_a_ledger_of_a_later_wizen_is_bad_and_not_to_be_deleted(own: Store, port: int) -> None:

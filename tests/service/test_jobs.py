@@ -18,6 +18,8 @@ from openapi_spec_validator import validate
 from service.app import create_app
 from service.jobs import views
 from service.settings import Settings
+from solver import registry
+from solver.contract import Need
 from store import starter
 from store.ledger.jobs import JobSpec
 from store.ledger.queue import Queue
@@ -134,6 +136,19 @@ def test_a_failure_comes_with_advice_and_may_be_tried_again(store: Store, queue_
     crashed = queue_only.post("/v1/jobs", json=body(trouble="crashes")).json()
     drain(store)
     assert "Traceback" not in queue_only.get(crashed["links"]["self"]).text
+
+
+def test_what_was_given_up_and_came_from_elsewhere_is_had(store: Store, queue_only: httpx.Client) -> None:
+    """As when another machine's results were copied into the store."""
+    job = queue_only.post("/v1/jobs", json=body(trouble="diverges")).json()
+    drain(store)
+    solver = registry.get("shrinking")
+    spec = store.ledger.get(job["id"])
+    result = solver.solve(solver.parse({**spec.params, "trouble": ""}), Need.parse(spec.need))
+    store.put(job["id"], result)
+    assert queue_only.post("/v1/jobs", json=body(trouble="diverges")).json()["state"] == "wanted"
+    assert drain(store) == 0, "it is here already"
+    assert queue_only.get(job["links"]["self"]).json()["state"] == "done"
 
 
 def test_pages_and_states(store: Store, queue_only: httpx.Client) -> None:

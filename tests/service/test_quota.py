@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from store.ledger.asks import asks
 from store.store import Store
+from store.tokens import Tokens
 from sweeps.commands.cli import app
 
 from ._asking import checked
@@ -42,6 +43,12 @@ def test_who_asked_is_noted_without_secrets(store: Store, open_service: httpx.Cl
     (row,) = json.loads(said.stdout)["asks"]
     assert (row["name"], row["client"], row["key"], row["state"]) == ("studio", "127.0.0.1", job["id"], "done")
     assert row["seconds"] >= 0
+    Tokens(store.root).revoke("studio")
+    Tokens(store.root).create("quiet", ["run"])
+    for token, code in (("studio", 0), ("quiet", 0), ("nobody", 1)):
+        seen = CliRunner().invoke(app, ["audit", "--store", str(store.root), "--token", token])
+        assert seen.exit_code == code, "what was revoked stays in it, and a mistyped name is no empty list"
+    assert "Known: other, quiet, studio." in seen.stderr
     everything = CliRunner().invoke(app, ["audit", "--store", str(store.root)])
     assert "other" in everything.stdout
     secret = head["Authorization"].split("_", 2)[2]  # which may hold a "_" itself

@@ -42,3 +42,18 @@ def test_conditions(client: httpx.Client) -> None:
         problem = checked(client.get("/v1/results", params=params), 422, "invalid-query")
         assert problem["errors"][0]["name"] in params
     checked(client.get("/v1/results?limit=0"), 422, "invalid-query")
+
+
+def test_what_is_listed_can_be_had_where_the_ledger_was_lost(own: Store) -> None:
+    own.ledger.close()
+    for path in own.root.glob("ledger.sqlite*"):
+        path.unlink()
+    with client_of(own.root) as client:
+        row = client.get("/v1/results?last=true&limit=1").json()["results"][0]
+        checked(client.get(f"/v1/jobs/{'0' * 64}"), 404, "unknown-job")
+        assert not own.ledger.path.exists(), "looking for what is not here begins none"
+        answer = client.get(f"/v1/jobs/{row['key']}/result")
+        assert (answer.status_code, answer.content[:4]) == (200, b"\x89HDF")
+        job = client.get(f"/v1/jobs/{row['key']}").json()
+        assert (job["state"], job["version"]) == ("done", row["version"])
+        assert len(client.get("/v1/jobs").json()["jobs"]) == 1

@@ -113,6 +113,22 @@ def test_what_a_seal_does_not_tell(tabled: Store, edit: Callable[[h5py.File], No
     assert said in findings[0].message
 
 
+def test_a_generation_that_is_pruned_meanwhile_is_no_finding(filled: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    tables.build(filled, SOLVER)
+    real, turns = audit._file, iter(["float64"])
+
+    def late(path: Path, table: tables.TableInfo) -> list[str]:
+        for dtype in turns:
+            tables.rebuild(filled, SOLVER, dtype=dtype)  # type: ignore[arg-type]
+            tables.prune(filled)
+        return list(real(path, table))
+
+    monkeypatch.setattr(audit, "_file", late)
+    assert audit.verify(filled) == []
+    tables.path_of(filled, tables.info(filled)).unlink()
+    assert "is missing" in audit.verify(filled)[0].message
+
+
 def test_a_result_that_was_replaced(store: Store) -> None:
     keys = fill(store, te=[0.03, 0.04])
     tables.build(store, SOLVER)

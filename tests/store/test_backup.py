@@ -283,6 +283,43 @@ def test_a_result_that_was_healed_since_replaces_its_damaged_copy(own: Store, tm
     assert Store(tmp_path / "again").get(key).attrs["digest"] == shards.digest(result)
 
 
+def test_what_was_damaged_already_is_named(own: Store, tmp_path: Path) -> None:
+    damaged, sound = sorted(own.root.glob("shards/*/*.h5"))
+    flip(damaged)
+    flip(tables.path_of(own, tables.info(own)))
+    names = tuple(path.relative_to(own.root).as_posix() for path in (damaged, tables.path_of(own, tables.info(own))))
+    copied = backup(own, tmp_path / "copy")
+    assert copied.damaged == names
+    assert (copied.kept, copied.gone) == ((), ())
+    restore(tmp_path / "copy", tmp_path / "again")
+    assert list(Store.open(tmp_path / "again").results()), f"{sound} is as good as before"
+
+
+def test_what_a_store_lost_stays_in_its_backup(own: Store, tmp_path: Path) -> None:
+    """Deleted by mistake, and the nightly backup goes on: the ledger still calls it done."""
+    first = backup(own, tmp_path / "copy")
+    generation = tables.path_of(own, tables.info(own))
+    generation.unlink()
+    keys = list(own.keys())
+    shutil.rmtree(own.root / "shards")
+    (own.root / "shards").mkdir()
+    second = backup(own, tmp_path / "copy")
+    assert second.files == first.files
+    lost = [generation, *map(own.shard_path, keys)]
+    assert sorted(second.kept) == sorted(path.relative_to(own.root).as_posix() for path in lost)
+    assert backup(own, tmp_path / "copy").files == first.files, "night after night"
+    restore(tmp_path / "copy", tmp_path / "again")
+    again = Store.open(tmp_path / "again")
+    assert [result.attrs["key"] for result in again.results()] == keys
+    tables.open(again).close()
+    flip(next((tmp_path / "copy").glob("shards/*/*.h5")))
+    third = backup(own, tmp_path / "copy")
+    assert len(third.kept) == 2
+    assert third.gone == (keys[0],), "neither has it any more"
+    own.ledger.rebuild(own.results())
+    assert backup(own, tmp_path / "copy").gone == (), "what waits again is not done"
+
+
 def test_a_store_in_which_nothing_changes(tmp_path: Path) -> None:
     """Neither ledger nor tables nor tokens."""
     store = Store.open(tmp_path / "store", create=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from store.errors import CorruptLedger, QuotaSpent, ReadOnlyStore, StorageFailed
+from store.errors import CorruptLedger, MissingStore, QuotaSpent, ReadOnlyStore, StorageFailed
 from store.ledger import database
 from store.ledger.asks import Asker, Spending, asks
 from store.ledger.ledger import Ledger
@@ -75,6 +75,38 @@ def test_a_ledger_that_may_not_be_written_is_read() -> None:
             connection.execute("PRAGMA user_version = 1")
         with as_another(Path(name)), pytest.raises(ReadOnlyStore, match="Copy the store"):
             ledger.counts()
+
+
+def test_a_ledger_that_was_deleted_is_not_written_to(ledger: Ledger, tmp_path: Path) -> None:
+    """As the documents have it deleted where it is damaged, while a service has it open."""
+    ledger.want([job("a"), job("b")])
+    claimed = claim(ledger)
+    for path in tmp_path.glob("ledger.sqlite*"):
+        path.unlink()
+    assert ledger.failed(claimed, {"code": "x"}) is None, "nobody knows of that claim any more"
+    ledger.want([job("c")])
+    other = Ledger(ledger.path)
+    assert [one.key for one in other.jobs()] == ["c"], "who opens it now reads what is written now"
+    other.want([job("d")])
+    assert [one.key for one in ledger.jobs()] == ["c", "d"]
+
+
+def test_a_ledger_that_was_restored_in_its_place_is_read(tmp_path: Path) -> None:
+    kept, store = Ledger(tmp_path / "kept" / "ledger.sqlite"), tmp_path / "store"
+    kept.path.parent.mkdir()
+    store.mkdir()
+    kept.want([job("before")])
+    kept.close()
+    ledger = Ledger(store / "ledger.sqlite")
+    ledger.want([job("after")])
+    store.rename(tmp_path / "away")
+    for _ in range(2):
+        with pytest.raises(MissingStore, match="no store"):
+            ledger.want([job("nowhere")])
+    assert not store.exists()
+    (tmp_path / "kept").rename(store)
+    assert [one.key for one in ledger.jobs()] == ["before"]
+    assert [one.key for one in Ledger(tmp_path / "away" / "ledger.sqlite").jobs()] == ["after"]
 
 
 def test_a_file_that_is_no_ledger(ledger: Ledger) -> None:

@@ -84,6 +84,28 @@ def test_rebuilt_from_shards_alone(filled: Store) -> None:
     assert (after.digest, after.keys, after.axes) == (before.digest, before.keys, before.axes)
 
 
+def test_results_that_came_without_the_ledger_are_not_left_out(store: Store, tmp_path: Path) -> None:
+    """Copied in from another machine's store, or here since before a ledger that was lost."""
+    other = Store.open(tmp_path / "other", create=True)
+    (failed, _) = fill(other, te=[0.03, 0.05])
+    fill(store, te=[0.04])
+    store.ledger.want([spec(te=0.03)])
+    held = store.ledger.claim("w", 60.0)
+    assert held is not None
+    assert held.key == failed
+    assert store.ledger.failed(held, {"code": "x"}, 1) == "failed"
+    shutil.copytree(other.root / "shards", store.root / "shards", dirs_exist_ok=True)
+    assert tables.build(store, SOLVER).axes["te"] == (0.03, 0.05)
+    assert store.ledger.counts()["done"] == 3
+    assert store.learn() == 0
+    store.ledger.want([spec(te=0.06)])
+    running = store.ledger.claim("w", 60.0)
+    assert running is not None
+    store.put(running.key, make(te=0.06)[1])
+    assert store.learn() == 0, "who runs it says that it is done"
+    assert store.ledger.done(running, "digest", 1.0)
+
+
 def test_nothing_to_build_from(store: Store) -> None:
     with pytest.raises(EmptyTable, match="displacement"):
         tables.build(store, SOLVER)

@@ -15,6 +15,7 @@ from conftest import write
 
 from solver.contract import Unstable
 from solver.dehydration import SOLVER
+from store import starter, tables
 from store.store import Store
 
 
@@ -53,6 +54,9 @@ def test_runs_of_a_table_solved_again(table: Path, tmp_path: Path) -> None:
     result = wizen("table", "verify", "--store", copy, "--recompute", 2, "--json")
     assert result.exit_code == 0
     assert [spot["same"] for spot in document(result)["recomputed"]] == [True, True]
+    for path in copy.glob("ledger.sqlite*"):
+        path.unlink()  # as lost: the results say what they are of
+    assert wizen("table", "verify", "--store", copy, "--recompute", 1).exit_code == 0
     # results that another machine computed a little otherwise, and stored well
     store = Store.open(copy)
     for job in store.ledger.jobs("done"):
@@ -81,6 +85,23 @@ def test_rebuild_and_compare(table: Path, tmp_path: Path) -> None:
     assert "the same content" in shown
     assert wizen("table", "compare", "default", "default", "--store", copy, "--name", "x").exit_code == 0
     assert wizen("table", "compare", "nothing.h5", copy).exit_code == 2
+
+
+def test_what_is_not_current_is_deleted_when_it_is_asked_for(table: Path, tmp_path: Path) -> None:
+    copy = shutil.copytree(table, tmp_path / "copy")
+    for precision in ("float64", "int16"):
+        assert wizen("table", "rebuild", "--store", copy, "--precision", precision).exit_code == 0
+    home = copy / "tables" / "default"
+    current, sizes = Store(copy), {path.name: path.stat().st_size for path in home.glob("*.h5")}
+    kept = tables.path_of(current, tables.info(current)).name
+    said = document(wizen("table", "prune", "--store", copy, "--json"))
+    assert sorted(said["deleted"]) == sorted(sizes.keys() - {kept})
+    assert said["bytes"] == sum(sizes.values()) - sizes[kept]
+    assert [path.name for path in home.glob("*.h5")] == [kept]
+    assert wizen("table", "verify", "--store", copy).exit_code == 0
+    assert "0 old generations" in wizen("table", "prune", "--store", copy).stdout
+    assert wizen("table", "prune", "--store", copy, "--name", "nobody").exit_code == 1
+    assert "takes nothing new" in wizen("table", "prune", "--store", starter.ROOT, "--name", "sphere").stderr
 
 
 def test_more_waves_than_the_runs_hold_are_said_not_to_be_had(table: Path, tmp_path: Path) -> None:

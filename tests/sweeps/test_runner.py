@@ -64,6 +64,27 @@ def test_a_lost_ledger_costs_nothing(shrinking: Solves, store: Store, write_plan
     assert len(shrinking) == 6
 
 
+def test_a_ledger_that_is_deleted_meanwhile_costs_nothing(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan, deleted, stop = Plan.load(write_plan()), list[str](), threading.Event()
+
+    def observe(event: Event) -> None:
+        if event.kind == "done" and not deleted:
+            deleted.append(event.key)
+            for path in store.root.glob("ledger.sqlite*"):
+                path.unlink()
+
+    late = threading.Timer(60, stop.set)  # else it would go on for ever
+    late.start()
+    with executors.serial() as workers:
+        report = run_plan(plan, store, workers, observe, stop=stop)
+    late.cancel()
+    assert report.complete
+    assert report.solved + report.reused == 6
+    assert report.reused >= 0
+    assert len(list(store.keys())) == 6
+    assert Store.open(store.root).ledger.counts()["done"] == 6
+
+
 def test_a_deleted_or_damaged_shard_is_solved_again(shrinking: Solves, store: Store, write_plan: Write) -> None:
     plan = Plan.load(write_plan())
     keys = [job.key for job in plan.jobs()]
@@ -132,6 +153,20 @@ def test_errors_are_typed(
         report = run_plan(Plan.load(write_plan("[0.03]", "[10]", f'trouble = "{trouble}"')), store, workers)
     assert report.failed[0].error["code"] == code
     assert len(shrinking) == solves
+
+
+def test_what_was_given_up_and_came_from_elsewhere_counts(shrinking: Solves, store: Store, write_plan: Write) -> None:
+    plan = Plan.load(write_plan("[0.03]", "[10]"))
+    (job,) = plan.jobs()
+    store.ledger.want([job])
+    held = store.ledger.claim("w", 60.0)
+    assert held is not None
+    assert store.ledger.failed(held, {"code": "x", "message": "x", "advice": ""}, 1) == "failed"
+    store.put(job.key, plan.solver.solve(plan.samples[0], plan.need))
+    before = len(shrinking)
+    with executors.serial() as workers:
+        report = run_plan(plan, store, workers)
+    assert (report.complete, report.reused, len(shrinking)) == (True, 1, before)
 
 
 def test_the_second_try_may_succeed(shrinking: Solves, store: Store, write_plan: Write) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...errors import InvalidOption
+from .console import note
 
 if TYPE_CHECKING:
     from solver.contract import Solver
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from store.manifest import TableInfo
     from store.store import Store
 
-__all__ = ["asked_table", "open_store", "run_command", "solver_of"]
+__all__ = ["asked_table", "begin_store", "open_store", "run_command", "solver_of"]
 
 
 def open_store(root: Path | None) -> Store:
@@ -29,6 +30,22 @@ def open_store(root: Path | None) -> Store:
     from store.store import Store
 
     return Store.open(root or starter.ROOT)
+
+
+def begin_store(root: Path) -> Store:
+    """Open a store, or begin one, and say so: a name may be mistyped.
+
+    Raises:
+        ReadOnlyStore: it cannot be made there.
+
+    """
+    from store.store import Store
+
+    new = not (root / "shards").is_dir()
+    opened = Store.open(root, create=True)
+    if new:
+        note(f"a new store in {root.absolute()}")
+    return opened
 
 
 def asked_table(
