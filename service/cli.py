@@ -104,7 +104,7 @@ def _announce(settings: Settings, port: int, secret: str) -> None:
     if secret:
         # behind the number sign: browsers send that to nobody
         note(f"the studio: {address}/#token={secret}")
-    for line in hints(settings.store, address):
+    for line in hints(settings.store, address, settings.page):
         note(line)
 
 

@@ -46,7 +46,10 @@ _SKEW = 5.0
 _EXTRAS = {
     "distributed": "runs on many machines: pip install '.[cluster]'",
     "trimesh": "meshes of one's own: pip install '.[formats]'",
+    "OpenEXR": "maps in floating point: pip install '.[formats]'",
     "pxr": "USD files: pip install '.[usd]'",
+    "meshoptimizer": "scenes in fewer bytes: pip install '.[scenes]'",
+    "xatlas": "textures on meshes that have no coordinates: pip install '.[unwrap]'",
     "pypardiso": "MKL's sparse factor (WIZEN_FACTOR): pip install '.[mkl]'",
 }
 
@@ -155,7 +158,7 @@ def _is_ours(host: str, port: int) -> bool:
 def _page(built: Path) -> Finding:
     if (built / "index.html").is_file():
         return Finding("page", "good", f"built in {built}")
-    return Finding("page", "note", "the web page is not built", "`make page` in a checkout builds it.")
+    return Finding("page", "note", "the web page is not built", "`make page` in a checkout builds it; WIZEN_PAGE says where it is.")
 
 
 def _place(root: Path) -> Finding:

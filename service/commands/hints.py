@@ -11,8 +11,10 @@ from store.store import Store
 __all__ = ["hints"]
 
 
-def hints(root: Path, address: str) -> list[str]:
-    """Return lines to print when a service starts at `address` (scheme, host and port) over the store at `root`."""
+def hints(root: Path, address: str, page: Path) -> list[str]:
+    """Return lines to print when a service starts at `address` (scheme, host and port) over the store at `root`, with
+    the web page that is built in `page`, if it is.
+    """
     try:
         store = Store.open(root)
         names = store.table_names()
@@ -24,10 +26,12 @@ def hints(root: Path, address: str) -> list[str]:
     middle = "&".join(f"{axis}={(low + high) / 2:.4g}" for axis, (low, high) in table.axes.items())
     last = table.stages[-1]
     shape = f"{address}/v1/shapes/{table.solver}?{middle}&s={last:g}".replace("?&", "?")
+    # the page of /docs is built with the other
+    docs = "docs" if (page / "index.html").is_file() else "openapi.json"
     return [
         "try:",
         f"  curl '{shape}&resolution=128&format=glb' -o fruit.glb",
         f"  curl '{shape}' -H 'Accept: application/json'",
         f"  curl '{address}/v1/tables'",
-        f"and {address}/docs explains every parameter with its unit and range",
+        f"and {address}/{docs} explains every parameter with its unit and range",
     ]

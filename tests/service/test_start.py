@@ -5,10 +5,13 @@ from __future__ import annotations
 import gc
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
+from service.commands.hints import hints
 from service.limits import memory
+from store import starter
 
 #: Each takes a tenth of a second to a second to import.
 HEAVY = {
@@ -45,3 +48,11 @@ def test_the_garbage_collector_walks_again_once_the_service_is_loaded() -> None:
     with pytest.raises(OSError, match="no port"), memory.loading():
         raise OSError("no port")
     assert gc.isenabled()
+
+
+def test_what_is_said_at_the_start_can_be_opened(tmp_path: Path) -> None:
+    """The page that explains parameters is built with the other one; without, it says that it is not."""
+    address = "http://127.0.0.1:1"
+    assert hints(starter.ROOT, address, tmp_path)[-1].startswith(f"and {address}/openapi.json explains")
+    (tmp_path / "index.html").touch()
+    assert hints(starter.ROOT, address, tmp_path)[-1].startswith(f"and {address}/docs explains")
