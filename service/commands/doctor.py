@@ -158,7 +158,9 @@ def _is_ours(host: str, port: int) -> bool:
 def _page(built: Path) -> Finding:
     if (built / "index.html").is_file():
         return Finding("page", "good", f"built in {built}")
-    return Finding("page", "note", "the web page is not built", "`make page` in a checkout builds it; WIZEN_PAGE says where it is.")
+    return Finding(
+        "page", "note", "the web page is not built", "`make page` in a checkout builds it; WIZEN_PAGE says where it is."
+    )
 
 
 def _place(root: Path) -> Finding:
