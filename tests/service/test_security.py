@@ -154,4 +154,4 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert wizen("token", "create", "--name", "studio")[0] == 2
     assert wizen("token", "revoke", "studio")[0] == 0
     assert wizen("token", "revoke", "studio")[0] == 1
-    assert wizen("work", "--until-empty") == (0, {"solved": 0})
+    assert wizen("work", "--until-empty") == (0, {"solved": 0, "failed": []})
