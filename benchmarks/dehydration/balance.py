@@ -59,7 +59,7 @@ _RELAXED = (
     *("family", "quality", "te", "gamma", "s", "residual", "steps", "moved", "correlation", "crossing pairs"),
     *("volume over exact, looked up", "relaxed", "seconds", "processor seconds"),
 )
-#: te, gamma and s of fruits that are relaxed to the end: of the default family, of one at preview, and of eighths.
+#: te, gamma and s of fruits that are relaxed to the end: of the default family, of one at preview, and of quarters.
 _FRUITS = (
     *((0.0375, 22.0, 0.2), (0.0375, 22.0, 0.3), (0.0325, 13.0, 0.2), (0.0325, 13.0, 0.3)),
     *((0.03, 10.0, 0.3), (0.04, 50.0, 0.3)),
@@ -67,7 +67,7 @@ _FRUITS = (
 _CORNERS = {"te": [0.04, 0.03], "gamma": [10, 20]}
 _AT_PREVIEW = ((0.0345, 14.0, 0.2), (0.0345, 14.0, 0.3), (0.0375, 17.0, 0.2), (0.0375, 17.0, 0.3), (0.03, 10.0, 0.3))
 _THIN = "sphere-01"
-_EIGHTHS = ((0.01, 13.0, 0.2), (0.01, 23.0, 0.3), (0.01, 10.0, 0.3))
+_QUARTERS = ((0.01, 13.0, 0.2), (0.01, 23.0, 0.3), (0.01, 10.0, 0.3))
 _LATTICE = 64
 #: Last stage of the narrower goals.
 _EARLY = 0.2
@@ -195,7 +195,7 @@ def _tier(root: Path) -> None:
     corners = _corners(root)
     # the pattern that a fruit begins with is in the store of its runs, or in the package
     context = Context(library=Store.open(root).find)
-    for table, fruits in ((package, _FRUITS), (corners, _AT_PREVIEW), (thin, _EIGHTHS)):
+    for table, fruits in ((package, _FRUITS), (corners, _AT_PREVIEW), (thin, _QUARTERS)):
         for fruit in fruits:
             _relax(sheet, table, context, *fruit)
     sheet.keep(digest=package.digest)
