@@ -38,8 +38,9 @@ Fixed = NDArray[np.int32]
 RESIDUAL = 5e-3
 #: Increments in which a surface is pushed on, more where what they push blows up (plum 1 at s = 0.3, where folds are
 #: deep), turns after them for which it is held, steps of the inside in each of both, and their damping. Let go sooner,
-#: it is pushed away by what is not in balance below: what was in balance (runs of a table) came out up to 4 % less
-#: rough, within the residual that counts; after these turns 1 to 2 %, in as many steps all in all.
+#: it is pushed away by what is not in balance below: the roughness of what was in balance (runs of a table) changed by
+#: up to 4 %, within the residual that counts; after these turns by .7 % (record dehydration-score), in as many steps
+#: all in all.
 _INCREMENTS, _HELD, _STEPS, _DAMPING = (5, 15, 45), 10, 20, 0.2
 #: Damping of the turns in which what was pushed on is calmed, volumes following, and the steps of each.
 _CALMING, _TURN = (0.12, 0.12, 0.12, 0.12, 0.06, 0.06), 50

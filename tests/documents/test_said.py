@@ -16,6 +16,7 @@ import pytest
 import typer.main
 
 from benchmarks import figures
+from benchmarks.dehydration import balance
 from service.cli import app
 from solver.decay import SOLVER as DECAY
 from solver.decay import DecayParams
@@ -104,6 +105,30 @@ def test_seeds_differ_from_their_mean_by_what_is_said() -> None:
     percent = {gamma: f"{100 * off:.0f}" for gamma, off in worst.items()}
     said = f"by up to {percent[10]} % at gamma 10, {percent[30]} % at 30 and {percent[50]} % at 50"
     assert said in _page("docs/dehydration.md")
+
+
+def test_families_that_miss_goals_are_counted_as_they_are() -> None:
+    record = figures.load("dehydration-score")
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in balance.table(record).splitlines()]
+    family, missed = rows[0].index("family"), rows[0].index("missed")
+    every = {row[family] for row in rows[2:]}
+    misses = {(row[family], row[missed]) for row in rows[2:] if row[missed] != "-"}
+    page = _page("docs/maps.md")
+    assert f"Of {len(every)} families {len(every) - len({name for name, _ in misses})} miss nothing" in page
+    assert misses == {("plum1", "slopes W1")}
+
+
+def test_runs_of_tables_keep_their_roughness_as_is_said() -> None:
+    off = defaultdict(list)
+    for run in figures.load("dehydration-score")["runs"]:
+        for s in run["stages"]:
+            own = [row["rgh"] for row in run["each"] if row["method"] == "sample" and row["stage"] == s]
+            off[run["family"]].append(abs(float(np.mean(own)) - 1))
+    worst = max(max(each) for family, each in off.items() if family != "plum1")
+    said = re.search(r"keep their roughness to (\.\d) %, but plum 1's, .* to (\d\.\d) %\.", _page("docs/maps.md"))
+    assert said
+    assert 100 * worst < float(said[1]) + 0.05
+    assert 100 * max(off["plum1"]) < float(said[2]) + 0.05
 
 
 def test_slow_frames_of_painting_are_as_slow_as_is_said() -> None:
