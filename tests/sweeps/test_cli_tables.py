@@ -160,7 +160,7 @@ def test_query(table: Path, tmp_path: Path) -> None:
     "said",
     [
         ("--preset", "raisin", "--set", "mirrors=xz"),
-        ("--set", "te=0.01", "--set", "gamma=20", "--set", "mirrors=xyz"),
+        ("--set", "te=0.01", "--set", "gamma=20", "--set", "mirrors=xz"),
         ("--set", "te=0.035", "--set", "gamma=20", "--set", "imperfection_kind=waves"),
     ],
 )
