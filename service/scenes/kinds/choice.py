@@ -20,7 +20,7 @@ from ..errors import InvalidScene
 from ..request import Item
 from .kind import Kind
 from .looked import Looked
-from .runs import Missing, Runs, find
+from .runs import Missing, Runs, Together, find
 from .shades import shade_of
 
 __all__ = ["distinct"]
@@ -42,6 +42,7 @@ def distinct(
 
     """
     runs = runs or Runs(lambda: tables.store, lambda asked: (None, "Ask for it with POST /v1/jobs."))
+    together = Together(items)
     numbers: dict[tuple[object, ...], tuple[int, ...]] = {}
     kinds: list[Kind] = []
     rows: list[tuple[int, ...]] = []
@@ -59,7 +60,7 @@ def distinct(
             number = numbers.get(key)
         if number is None:
             try:
-                found = _kinds_of(item, tables, highest, runs)
+                found = _kinds_of(item, tables, highest, runs, together)
             except (StoreError, SolverError, ServiceError) as error:
                 wrong += _complaints(error, f"items.{i}")
                 found = []
@@ -75,16 +76,18 @@ def distinct(
     return kinds, rows
 
 
-def _kinds_of(item: Item, tables: LiveTables, highest: int, runs: Runs) -> list[Kind]:
+def _kinds_of(item: Item, tables: LiveTables, highest: int, runs: Runs, together: Together) -> list[Kind]:
     """Return the kinds of an item: one, or as many as its individuals differ by; each with its variants."""
+    given = item
     if item.solver is None and item.run is None:
         item = item.model_copy(update={"solver": _solver_of(item, tables)})
     if _is_run(item, tables):
         if item.differ:
             advice = "Leave it out, or name several runs."
             raise InvalidQuery.of([Wrong("differ", "is of tables: a run is what it is", advice)])
-        found = _of_run(item, runs)
-        found.variants = tuple(_of_run(one, runs) for one in _variants(item))
+        stages = () if item.run is not None else together.stages(given)
+        found = _of_run(item, runs, stages)
+        found.variants = tuple(_of_run(one, runs, stages) for one in _variants(item))
         return [found]
     made: list[Kind] = [*_of_table(item, tables, highest)]
     for one in _variants(item):
@@ -128,17 +131,17 @@ def _is_run(item: Item, tables: LiveTables) -> bool:
     return item.solver in registry.names() and item.solver not in tables.solvers()
 
 
-def _of_run(item: Item, runs: Runs) -> Kind:
+def _of_run(item: Item, runs: Runs, stages: Sequence[float]) -> Kind:
     # these take a while to import, and most scenes are of tables alone
     from .placeholders import placeholder
     from .stored import stored
 
-    found = find(item, runs)
+    found = find(item, runs, stages)
     if not isinstance(found, Missing):
         return stored(runs.store(), found, item)
     if item.shade is not None:
         shade_of(found.solver, item.shade, item.preset)  # says which there are
-    return placeholder(found, item.preset or found.solver.name)
+    return placeholder(found, item.preset or found.solver.name, item.stages)
 
 
 def _of_table(item: Item, tables: LiveTables, highest: int) -> list[Looked]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from solver.arrays import Array, Floats
@@ -23,8 +25,11 @@ _THIN = 0.02
 _ROUND = 48
 
 
-def placeholder(missing: Missing, name: str) -> Stored:
-    """Return what stands in for a run that is not stored: the fresh shape, else a box as large as what is run."""
+def placeholder(missing: Missing, name: str, stages: Sequence[float] = ()) -> Stored:
+    """Return what stands in at some stages, or all, of a run that is not stored: the fresh shape, else a box as large
+    as what is run.
+    """
+    shown = list(stages) or list(missing.spec.need["stages"])
     solver, values = missing.solver, missing.params.model_dump(mode="json")
     fresh, metres = solver.fresh(values), solver.metres(values)
     worn = DUMMY[1].worn(0.0)
@@ -44,14 +49,13 @@ def placeholder(missing: Missing, name: str) -> Stored:
         "placeholder": what,
         "solver": solver.name,
         "symbol": solver.stages.symbol,
-        "stages": list(missing.spec.need["stages"]),
+        "stages": shown,
         "sides": [round(float(x), 6) for x in sides],
     }
     trust = {"expected_error": None, "exact": False, "converged": None}
     made = Whole(solid, worn, metres, fresh is not None, source, trust)
-    stages = missing.spec.need["stages"]
-    last = f"..{stages[-1]:g}" if len(stages) > 1 else ""
-    return Stored(f"{name} {solver.stages.symbol}={stages[0]:g}{last}, missing", made, (), missing)
+    last = f"..{shown[-1]:g}" if len(shown) > 1 else ""
+    return Stored(f"{name} {solver.stages.symbol}={shown[0]:g}{last}, missing", made, (), missing)
 
 
 def _sides(solver: Solver, params: Params) -> tuple[Floats, float | None]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 from solver.contract import Need, Params, Quality, Solver, SolverError
@@ -17,7 +19,7 @@ from ... import vocabulary
 from ...errors import InvalidQuery, ServiceError, Wrong
 from ..request import Item
 
-__all__ = ["Ask", "Asked", "Missing", "Runs", "find"]
+__all__ = ["Ask", "Asked", "Missing", "Runs", "Together", "find"]
 
 _ORDER: tuple[Quality, ...] = ("preview", "default", "fine")
 
@@ -63,15 +65,38 @@ class Runs:
     ask: Ask
 
 
-def find(item: Item, runs: Runs) -> str | Missing:
-    """Return the key of the stored run that an item means, or what is missing.
+class Together:
+    """All stages at which a scene shows the same run: one job has them all, and a job a stage would each begin anew."""
+
+    def __init__(self, items: Sequence[Item]) -> None:
+        self._items = items
+
+    @cached_property
+    def _stages(self) -> dict[str, tuple[float, ...]]:
+        found: dict[str, set[float]] = {}
+        for item in self._items:
+            if item.run is None:
+                found.setdefault(_run(item), set()).update((*item.stages, *item.variants))
+        return {name: tuple(sorted(stages)) for name, stages in found.items()}
+
+    def stages(self, item: Item) -> tuple[float, ...]:
+        """Return the stages of an item of the scene, and of all others that are of its run."""
+        return self._stages[_run(item)]
+
+
+def _run(item: Item) -> str:
+    return json.dumps([item.solver, item.preset, item.parameters, item.quality], sort_keys=True)
+
+
+def find(item: Item, runs: Runs, stages: Sequence[float] = ()) -> str | Missing:
+    """Return the key of the stored run that an item means, or what is missing: a run of these stages, where given.
 
     Raises:
         InvalidQuery: there is no such run, nobody can compute it, or it failed.
         SolverError, ServiceError, StoreError: as the solver or the store say it.
 
     """
-    return _asked(item, runs) if item.run is None else _named(item.run, runs)
+    return _asked(item, runs, stages or item.stages) if item.run is None else _named(item.run, runs)
 
 
 def _named(run: str, runs: Runs) -> str | Missing:
@@ -94,14 +119,16 @@ def _named(run: str, runs: Runs) -> str | Missing:
     return Missing(solver, solver.parse(job.params), job, job, *_waiting(job))
 
 
-def _asked(item: Item, runs: Runs) -> str | Missing:
-    asked = _question(item)
-    store, spec = runs.store(), asked.spec
-    if store.has(spec.key):
-        return spec.key
-    for job in _alike(store, spec):
+def _asked(item: Item, runs: Runs, stages: Sequence[float]) -> str | Missing:
+    asked = _question(item, item.stages)
+    store = runs.store()
+    if store.has(asked.spec.key):
+        return asked.spec.key
+    for job in _alike(store, asked.spec):
         if store.has(job.key) and _fits(job, asked.need, item.quality):
             return job.key
+    asked = _question(item, stages)
+    spec = asked.spec
     known = _job(store, spec.key)
     if known is not None:
         _check_failed(known, "preset" if item.preset else "parameters")
@@ -117,14 +144,14 @@ def _asked(item: Item, runs: Runs) -> str | Missing:
     return Missing(asked.solver, asked.params, spec, waiting, *_waiting(waiting))
 
 
-def _question(item: Item) -> Asked:
-    """Return what an item asks a solver: its surface, and what gives that its colours."""
+def _question(item: Item, stages: Sequence[float]) -> Asked:
+    """Return what an item asks a solver: its surface at these stages, and what gives that its colours."""
     solver = vocabulary.solver_named(item.solver or "")
     params = solver.parse(item.parameters, item.preset)
     fresh = solver.fresh(params.model_dump(mode="json"))
     shape = "position" if fresh is not None and "position" in solver.fields else "mesh_position"
     more = (name for name in (*solver.looks.layers, *solver.looks.scalars) if name in solver.fields)
-    need = Need(stages=item.stages, fields=(shape, *more), quality=item.quality or "default")
+    need = Need(stages=tuple(stages), fields=(shape, *more), quality=item.quality or "default")
     settled = solver.settle(need, item.preset, (params,))
     return Asked(solver, item.preset, item.parameters, params, settled, JobSpec.of(solver, params, settled))
 

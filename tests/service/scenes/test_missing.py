@@ -83,6 +83,32 @@ def _from_nothing_to_a_shape(store: Store, queue_only: httpx.Client, anyone: htt
     assert "Ask for something else." in said["advice"]
 
 
+@pytest.mark.usefixtures("shrinking")
+def test_one_job_has_all_stages_at_which_a_scene_shows_a_run(store: Store, queue_only: httpx.Client) -> None:
+    items = [
+        {**ITEM, "stage": 0.25, "variants": [0.1, 0.3]},
+        {**ITEM, "stage": 0.2, "transforms": [{"position": [3, 0, 0]}]},
+        {**ITEM, "stage": 0.2, "quality": "default", "transforms": [{"position": [6, 0, 0]}]},
+    ]
+    scene = {"camera": CAMERA, "items": items}
+
+    def report() -> dict[str, Any]:
+        return dict(queue_only.post("/v1/scenes?format=json", json=scene).raise_for_status().json())
+
+    found = report()
+    assert [item["stages"] for item in found["items"]] == [[0.25], [0.2], [0.2]]  # each stands in for its own
+    jobs = queue_only.get("/v1/jobs").json()["jobs"]
+    stages = {job["id"]: queue_only.get(f"/v1/jobs/{job['id']}").json()["need"]["stages"] for job in jobs}
+    assert sorted(stages.values()) == [[0.1, 0.2, 0.25, 0.3], [0.2]]
+    assert stages[found["items"][0]["missing"]["key"]] == [0.1, 0.2, 0.25, 0.3]
+    assert drain(store) == 2
+    done = report()
+    assert done["missing"] == 0
+    assert [item["stages"] for item in done["items"]] == [[0.25], [0.2], [0.2]]
+    assert done["items"][0]["run"] == done["items"][1]["run"] != done["items"][2]["run"]
+    assert len(queue_only.get("/v1/jobs").json()["jobs"]) == 2
+
+
 def test_places_hold_boxes_of_the_right_size(tmp_path: Path) -> None:
     root = Store.open(tmp_path / "store", create=True).root
     scene = {
