@@ -8,12 +8,13 @@ from collections.abc import Mapping
 from datetime import UTC, datetime
 from typing import Any, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from solver import registry
 from solver.contract import Cost, Need, SolverError
 from store.ledger.jobs import Job, State
 
+from ..errors import InvalidQuery, Wrong
 from ..problems import URN
 from ..views.addresses import link
 
@@ -45,6 +46,27 @@ class JobRequest(BaseModel):
     params: dict[str, Any] = Field(default_factory=dict, description="Parameters, and scalar axes as they are queried")
     need: Need = Field(default_factory=Need, description="What is needed; nothing else is computed")
     again: bool = Field(False, description="Try once more what was given up")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_place(cls, body: Any) -> Any:
+        """Say of what belongs one level deeper where that is."""
+        if not isinstance(body, dict):
+            return body
+        name = body.get("solver")
+        known = registry.get(name) if isinstance(name, str) and name in registry.names() else None
+        wrong = []
+        for key in body.keys() - cls.model_fields.keys():
+            if key in Need.model_fields:
+                home = "need"
+            elif known is not None and (key in known.params.model_fields or key in known.params.axes):
+                home = "params"
+            else:
+                continue
+            wrong.append(Wrong(key, f"belongs into {home}", f'Write {{"{home}": {{"{key}": ...}}}}.'))
+        if wrong:
+            raise InvalidQuery.of(sorted(wrong))
+        return body
 
 
 class Progress(BaseModel):

@@ -102,6 +102,15 @@ def test_what_cannot_be_is_refused_before_any_work(
     assert Queue(store.ledger).waiting() == []
 
 
+def test_what_stands_beside_need_and_params_is_told_its_place(queue_only: httpx.Client) -> None:
+    answer = queue_only.post("/v1/jobs", json={"solver": "dehydration", "stages": [0.1], "te": 0.04, "gamma": 10})
+    told = checked(answer, 422, "invalid-query")
+    assert told["detail"] == "gamma: belongs into params; stages: belongs into need; te: belongs into params."
+    assert '{"need": {"stages": ...}}' in told["advice"]
+    said = {"solver": "dehydration", "params": {"te": 0.1, "mirrors": "xyz"}, "need": {"stages": [0.1]}}
+    assert queue_only.post("/v1/jobs", json=said).status_code == 202  # as it advises
+
+
 def test_a_run_that_starts_from_a_result_that_is_not_there_is_refused(queue_only: httpx.Client, store: Store) -> None:
     need = {"stages": [0.1], "quality": "preview"}
 
