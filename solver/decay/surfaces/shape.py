@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..body.skin import Settled
     from ..within.inner import Held, Inner
 
-__all__ = ["Shape"]
+__all__ = ["Shape", "volume_of"]
 
 
 class _Settled(NamedTuple):
@@ -97,7 +97,20 @@ class Shape:
                 raise InvalidInput("an open mesh has no density.", advice="Close it, or leave the density out.")
         if self._dries:
             dried.check(self._params, self._need)
-            dried.displaced(self._params, self.lost(self._need.stages[-1]), 4, context)
+            dried.displaced(self._params, 0.0, 4, context)
+            self._check_dry(self._need.stages[-1], context)
+
+    def _check_dry(self, day: float, context: Context) -> None:
+        """Refuse what no table holds so dry, in the words of days, which were asked for."""
+        water = self.lost(day)
+        try:
+            dried.displaced(self._params, water, 4, context)
+        except InvalidInput as error:
+            lost = f"{water:.0%} of the weight and s = {dried.shrinkage(self._params, water):.3g} of each length"
+            raise InvalidInput(
+                f"by day {day:g} {lost} are lost: {error.message}",
+                advice="Ask for earlier days, or take body=quasi-static.",
+            ) from error
 
     @property
     def textured(self) -> dict[str, Any]:
@@ -173,10 +186,10 @@ class Shape:
             if "mesh_position" in wanted:
                 row["mesh_position"] = points.astype(need.dtype)
             if "volume" in wanted:
-                row["volume"] = _volume(points, self.surface)
+                row["volume"] = volume_of(points, self.surface)
             if "density" in wanted:
                 # an open mesh closes nothing whose volume could change
-                swells = _volume(points, self.surface) / _volume(self.surface.points, self.surface)
+                swells = volume_of(points, self.surface) / volume_of(self.surface.points, self.surface)
                 row["density"] = booked.mass / (swells if self._closed else 1.0)
         return row
 
@@ -227,7 +240,8 @@ class Shape:
         return water_lost(self._params, self._extent, day)
 
 
-def _volume(points: Floats, surface: Surface) -> float:
+def volume_of(points: Floats, surface: Surface) -> float:
+    """Return the volume [r1^3] within a surface whose points (v, 3) have moved."""
     # an imported mesh may be wound either way
     a, b, c = (points[surface.faces[:, k]] for k in range(3))
     return abs(float(np.sum(a * np.cross(b, c)))) / 6
