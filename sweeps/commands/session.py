@@ -55,7 +55,7 @@ def session(
         check_place("--save", save)
     saved = _driven(solver, list(_messages(actions)), params_file, preset, quality)
     if save is not None:
-        save.write_text(saved["toml"], encoding="utf-8")
+        save.write_text(saved["toml"].replace("session.toml", save.name, 2), encoding="utf-8")
         note(f"saved; the same again: {saved['command'].replace('session.toml', str(save))}")
 
 

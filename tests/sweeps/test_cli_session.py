@@ -58,6 +58,15 @@ def test_where_it_is_to_be_saved_is_looked_at_before_work(tmp_path: Path) -> Non
     assert "is a directory" in done.stderr
 
 
+def test_the_saved_file_says_how_it_is_run_itself(tmp_path: Path) -> None:
+    done = wizen("session", "growth", messages(tmp_path, BEGIN, DAB), "--save", tmp_path / "dab.toml")
+    assert done.exit_code == 0, done.stderr
+    said = (tmp_path / "dab.toml").read_text()
+    assert "save this as dab.toml" in said
+    assert "--params dab.toml" in said
+    assert "session.toml" not in said + done.stderr
+
+
 def test_a_message_that_is_wrong_is_bad_input_by_its_number(tmp_path: Path) -> None:
     done = wizen("session", "growth", messages(tmp_path, BEGIN, DAB, {**DAB, "radius": -1}))
     assert done.exit_code == 2
