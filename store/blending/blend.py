@@ -114,9 +114,8 @@ class Blender:
             mean = _form(parts, cell.power)
             lossy = float(mixed.lossy @ shares) / float(shares.sum())
             whole = targets.gains(known.scale(query), mixed.samples, mixed.weights, dict(stages), mean)
-            # where patterns agree their mean has the bands it should have, and a fit to all of the table knows less
-            gains = whole if lossy == 1 else whole**lossy
-            if lossy > 0:  # else all gains are 1, and a sixth of the time is for nothing
+            gains = whole if lossy == 1 else whole**lossy * bands.regained(parts, cell.power, mean) ** (1 - lossy)
+            if (gains != 1).any():  # else a sixth of the time is for nothing
                 factor = bands.multiplier(gains, targets.bands, waves.shape[-1] - 1)
                 poles.multiply(waves, factor, targets.highest)
             found, wanted = float(gains**2 @ mean), float(whole**2 @ mean)

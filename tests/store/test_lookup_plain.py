@@ -26,6 +26,11 @@ def squares(waves: np.ndarray) -> np.ndarray:
     return np.asarray(cells._local(waves[None], harmonics.degrees(waves)[None, ..., :3, :3])[0, 0])
 
 
+def _bands(waves: np.ndarray, targets: bands.Targets) -> np.ndarray:
+    """Return the power by band."""
+    return np.asarray(bands.add_up(harmonics.power(harmonics.degrees(waves)).sum(axis=0), targets.bands))
+
+
 def plain(table: ShapeTable, n: int, shared: float) -> tuple[np.ndarray, np.ndarray]:
     """Return positions (n, 2n, 3) and poles (2, 3) of the default method."""
     samples, stored, blender = table._samples, table._spectra, table._blender
@@ -39,10 +44,15 @@ def plain(table: ShapeTable, n: int, shared: float) -> tuple[np.ndarray, np.ndar
     full = sum(w * complex_view(stored[i, j]).astype(complex) for i, j, w in terms)
     assert isinstance(full, np.ndarray)
     targets = bands.Targets(blender.power, samples)
-    mean = bands.add_up(harmonics.power(harmonics.degrees(full)).sum(axis=0), targets.bands)
+    mean = _bands(full, targets)
     point = samples.scale(np.array(list(QUERY.values())))
     whole = targets.gains(point, taken, np.stack([weights, weights], axis=1), stages, mean)
-    gains = whole ** (1 - part)
+    sizes = [np.sqrt(_bands(complex_view(stored[i, j]).astype(complex), targets)) for i, j, _ in terms]
+    amplitude = np.asarray(sum(w * size for (_, _, w), size in zip(terms, sizes, strict=True)))
+    kept = np.sqrt((amplitude**2).sum() / mean.sum())
+    assert kept > 1.006  # from there on all that is lost is given back
+    faint = 1e-3 * mean.mean() + 1e-10
+    gains = whole ** (1 - part) * ((amplitude**2 + faint) / (mean + faint)) ** (part / 2)
 
     cut = slice(min(n, table.resolution) + 1)
     waves = full[:, cut, cut].copy()
@@ -53,8 +63,8 @@ def plain(table: ShapeTable, n: int, shared: float) -> tuple[np.ndarray, np.ndar
     poles.multiply(waves, np.interp(degree, knots, [1, *sharp, sharp[-1]]), targets.highest)
 
     local = squares(full)
-    sizes = [np.sqrt(squares(complex_view(stored[i, j]).astype(complex))) for i, j, _ in terms]
-    wanted = sum(w * amplitude for (_, _, w), amplitude in zip(terms, sizes, strict=True))
+    local_sizes = [np.sqrt(squares(complex_view(stored[i, j]).astype(complex))) for i, j, _ in terms]
+    wanted = sum(w * amplitude for (_, _, w), amplitude in zip(terms, local_sizes, strict=True))
     settled = envelope.Total(float((gains**2 * mean).sum()), float((whole**2 * mean).sum()))
     ratio = envelope.factor(local, np.asarray(wanted), settled)
     wave = spectra.spectrum(ratio)

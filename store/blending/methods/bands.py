@@ -5,10 +5,13 @@ logarithm, the shape of the spectrum by the Wasserstein mean (the quantiles of l
 instead of splitting in two), and its centroid with it. Total and centroid also follow a log-linear fit over the table
 wherever the weights alone do not reproduce it. At a sample all three are its own. Between stages amplitudes change
 linearly, as displacements do, and below the onset there is no power to divide by: then nothing is corrected.
+
+Where patterns agree (`thin`) the mean gets back what it has lost of its own terms (`regained`), and no more.
 """
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -21,7 +24,7 @@ from ...surfaces import alone, harmonics, steps
 from . import poles
 from .weights import Samples
 
-__all__ = ["Bands", "Targets", "add_up", "multiplier"]
+__all__ = ["Bands", "Targets", "add_up", "multiplier", "regained"]
 
 
 #: Bands per doubling of the degree.
@@ -32,6 +35,9 @@ _NOTHING = 1e-10
 _FAINT = 1e-3
 #: No band is made stronger or weaker than this: sixteen incoherent samples lose a factor of four.
 _MOST = 4.0
+#: Share of the height (rms) up to which what a mean has lost is left, and from which on all of it is given back: so
+#: little is not worth a sixth of a look-up's time.
+_LITTLE, _MUCH = 2e-3, 6e-3
 _QUANTILES = (np.arange(48) + 0.5) / 48
 #: Least way [ln l] from one quantile to the next; of a spectrum that is a single band it is five times that.
 _LEAST_RISE = 1e-3
@@ -125,6 +131,25 @@ class Targets:
         shares: Array = below[:, 1:] - below[:, :-1]
         shares += 1e-4
         return shares
+
+
+def regained(parts: Array, power: Array, mean: Array) -> Array:
+    """Return the factor (bands,) on amplitudes that gives a weighted mean of power `mean` (bands,) those of its terms.
+
+    `parts` (T,) are the weights, `power` (T, T, bands) the products of the terms by band. Where patterns agree no fit
+    to the table is needed: that their creases lie a little apart takes some from the mean, most from its shortest
+    waves, and how much is known.
+    """
+    own = np.sqrt(np.maximum(power[np.diag_indices(len(parts))], 0))
+    # weights that are negative make amplitudes so
+    wanted = np.maximum(parts @ own, 0) ** 2
+    height = math.sqrt((float(wanted.sum()) + _NOTHING) / (float(mean.sum()) + _NOTHING))
+    share = min(max((height - 1 - _LITTLE) / (_MUCH - _LITTLE), 0.0), 1.0)
+    if share == 0:
+        return np.ones(len(mean))
+    least = _FAINT * (float(mean.sum()) / len(mean)) + _NOTHING
+    found: Array = np.minimum(np.maximum(np.sqrt((wanted + least) / (mean + least)), 1 / _MOST), _MOST) ** share
+    return found
 
 
 def _rising(quantiles: Array) -> Array:
