@@ -8,11 +8,22 @@ from collections.abc import Callable, Mapping, Sequence
 
 from .figures import Sheet
 
-__all__ = ["Broken", "show"]
+__all__ = ["Broken", "demand", "show"]
 
 
 class Broken(AssertionError):
     """A try ended as none may."""
+
+
+def demand(fine: bool, what: str) -> None:
+    """End the try where it is not `fine`.
+
+    Raises:
+        Broken: saying what.
+
+    """
+    if not fine:
+        raise Broken(what)
 
 
 def show(tries: Mapping[str, Callable[[], str]], chosen: Sequence[str], solver: str) -> None:

@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, NamedTuple
 
-from solver import quantities, registry
+from solver import registry
 from solver.contract import InvalidInput, Solver
 
 from .errors import InvalidQuery, UnknownSolver, Wrong
 
-__all__ = ["Axis", "axes", "row_of", "solver_named", "units_of"]
+__all__ = ["Axis", "axes", "row_of", "solver_named"]
 
 
 class Axis(NamedTuple):
@@ -60,11 +60,6 @@ def axes(solver_name: str) -> Mapping[str, Axis]:
             default,
         )
     return found
-
-
-def units_of(names: Mapping[str, Any] | tuple[str, ...]) -> dict[str, str]:
-    """Return the units of those names that are registered quantities."""
-    return {name: quantities.QUANTITIES[name].units for name in names if name in quantities.QUANTITIES}
 
 
 def row_of(stages: Sequence[float], stage: float, of: str = "result") -> int:

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-__all__ = ["Frame", "changing", "frame", "kept"]
+__all__ = ["Frame", "changing", "frame"]
 
 
 class Frame(NamedTuple):
@@ -30,17 +30,6 @@ class Frame(NamedTuple):
     vertices: np.ndarray
     triangles: np.ndarray
     fields: Mapping[str, np.ndarray]
-
-
-def kept(frames: Sequence[Frame], dtype: str = "float32") -> dict[str, Any]:
-    """Return the variables of stages that share their triangles, for `xr.Dataset`."""
-    data: dict[str, Any] = {
-        "mesh_position": (("stage", "vertex", "component"), np.array([f.vertices for f in frames], dtype)),
-        "triangle": (("face", "corner"), np.asarray(frames[0].triangles, np.int32)),
-    }
-    for name in frames[0].fields:
-        data[name] = (("stage", "vertex"), np.array([f.fields[name] for f in frames], dtype))
-    return data
 
 
 def changing(frames: Sequence[Frame], dtype: str = "float32") -> dict[str, Any]:

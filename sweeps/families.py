@@ -24,6 +24,8 @@ __all__ = ["Said", "covered", "drawn", "gallery", "portrait", "said", "shade", "
 
 #: Share of the way to the last stage at which a family's picture is taken: wrinkled, and not yet crumpled.
 _DRY = 0.67
+#: Pixels of a family's picture; pictures in a row of the gallery, and pixels of each.
+_PIXELS, _COLUMNS, _LARGE = 160, 5, 240
 
 
 def covered(store: Store, families: Families, info: TableInfo, solver: Solver) -> dict[str, Any]:
@@ -125,10 +127,8 @@ def portrait(store: Store, families: Families, info: TableInfo) -> tuple[dict[st
     return {name: values[name][len(values[name]) // 2] for name in info.axes}, stage
 
 
-def thumbnail(
-    table: ShapeTable, point: Mapping[str, float], stage: float, pixels: int = 160, presets: Sequence[str] = ()
-) -> bytes:
-    """Return a PNG (pixels, pixels) of a shape, in the colours that its table or its presets are named after.
+def thumbnail(table: ShapeTable, point: Mapping[str, float], stage: float, presets: Sequence[str]) -> bytes:
+    """Return a PNG of a shape, in the colours that its table or its presets are named after.
 
     Raises:
         InvalidGeometry: no shape has these parameters.
@@ -143,7 +143,7 @@ def thumbnail(
     named = registry.get(table.info.solver).looks.shade_of((table.info.name, *presets))
     worn = None if named is None else named[1].worn(dryness(stage, table.reach))
     out = io.BytesIO()
-    Image.fromarray(render(shape.position, shape.poles, pixels, worn=worn)).save(out, "PNG", optimize=True)
+    Image.fromarray(render(shape.position, shape.poles, _PIXELS, worn=worn)).save(out, "PNG", optimize=True)
     return out.getvalue()
 
 
@@ -152,12 +152,12 @@ def drawn(table: ShapeTable, families: Families, store: Store) -> bytes:
     point, stage = portrait(store, families, table.info)
     presets = families.presets_of(table.info)
     try:
-        return thumbnail(table, point, stage, presets=presets)
+        return thumbnail(table, point, stage, presets)
     except InvalidGeometry:
-        return thumbnail(table, table.sample(table.size // 2), stage, presets=presets)
+        return thumbnail(table, table.sample(table.size // 2), stage, presets)
 
 
-def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
+def gallery(store: Store) -> bytes:
     """Return a PNG with the portraits of all tables of shapes in a store.
 
     Raises:
@@ -182,7 +182,7 @@ def gallery(store: Store, columns: int = 5, pixels: int = 240) -> bytes:
         panels.append(Panel(shape.position, shape.poles, note, worn=worn))
     if not panels:
         raise UnknownTable("the store has no table of shapes.", "Build one: `wizen table build`.")
-    return sheet([panels[i : i + columns] for i in range(0, len(panels), columns)], pixels=pixels)
+    return sheet([panels[i : i + _COLUMNS] for i in range(0, len(panels), _COLUMNS)], pixels=_LARGE)
 
 
 def shade(solver: Solver, info: TableInfo, families: Families) -> Shade | None:

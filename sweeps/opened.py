@@ -91,7 +91,7 @@ def opened(run: xr.Dataset, where: Cut) -> xr.Dataset:
     return xr.Dataset({**stage, **meshes.changing(frames)}, {"stage": run["stage"]}, attrs)
 
 
-def picture(run: xr.Dataset, where: Cut, *, title: str = "", symbol: str = "s", pixels: int = 360) -> bytes:
+def picture(run: xr.Dataset, where: Cut, *, title: str = "", symbol: str = "s") -> bytes:
     """Return a PNG of all stages cut open side by side, seen from before the cut face.
 
     Raises:
@@ -107,7 +107,7 @@ def picture(run: xr.Dataset, where: Cut, *, title: str = "", symbol: str = "s", 
     # a little from the side and from above, so that the skin is seen too
     level = float(np.degrees(np.arcsin(np.clip(y, -1, 1))))
     view = View(float(np.degrees(np.arctan2(z, x))) + _ASIDE, float(np.clip(level + _ABOVE, -80, 80)))
-    return sheet([panels], title=title, column_labels=labels, pixels=pixels, view=view)
+    return sheet([panels], title=title, column_labels=labels, pixels=360, view=view)
 
 
 def _whole(run: xr.Dataset, index: int) -> Frame:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from benchmarks.tries import Broken, show
+from benchmarks.tries import Broken, demand, show
 from solver.contract import Context, InvalidGeometry, Need
 from solver.decay import SOLVER, DecayParams
 from solver.decay.fields.layer import Layer
@@ -30,11 +30,6 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
-def _demand(fine: bool, what: str) -> None:
-    if not fine:
-        raise Broken(what)
-
-
 def _grown(values: dict[str, Any], preset: str | None = None) -> str:
     """Run rot and mould on a small sphere; return what they covered."""
     params = SOLVER.parse({"climate": "paper", **values}, preset)
@@ -45,11 +40,11 @@ def _grown(values: dict[str, Any], preset: str | None = None) -> str:
         for layer, state in zip((system.rot, system.mould), reached.state[:2], strict=True):
             assert layer is not None
             assert state is not None
-            _demand(all(np.isfinite(part).all() for part in state[:3]), "not finite")
-            _demand(min(part.min() for part in state[:3]) >= 0, "negative")
+            demand(all(np.isfinite(part).all() for part in state[:3]), "not finite")
+            demand(min(part.min() for part in state[:3]) >= 0, "negative")
             worst = max(worst, layer.budget_error(state))
             share = layer.share(state)
-    _demand(worst < 1e-11, f"the budget is off by {worst:.1e}")
+    demand(worst < 1e-11, f"the budget is off by {worst:.1e}")
     return f"mould on {100 * system.surface.mean(share > 0.1):.0f} %, budget {worst:.0e}, {reached.steps} steps"
 
 
@@ -61,8 +56,8 @@ def _spread(points: Array, faces: NDArray[np.int64], steps: int = 10) -> tuple[s
     state = layer.seeded(layer.fresh, points[0], 0.3)
     for _ in range(steps):
         state = layer.advance(state, 0.05)
-    _demand(all(np.isfinite(part).all() and part.min() >= 0 for part in state[:3]), "not finite or negative")
-    _demand(layer.budget_error(state) < 1e-11, "the budget is off")
+    demand(all(np.isfinite(part).all() and part.min() >= 0 for part in state[:3]), "not finite or negative")
+    demand(layer.budget_error(state) < 1e-11, "the budget is off")
     share = layer.share(state)
     return f"rot on {surface.mean(share > 0.01) * 100:.2g} %, budget {layer.budget_error(state):.0e}", surface, share
 
@@ -75,7 +70,7 @@ def _frames() -> str:
             *_, end = march(System(params, 8, True), days, 1e-3, 0.5, Context())
             ends.append(end.state[:2])
         same = all(np.array_equal(a, b) for x, y in zip(*ends, strict=True) for a, b in zip(x[:3], y[:3], strict=True))
-        _demand(same, "the number of frames changed the rot")
+        demand(same, "the number of frames changed the rot")
     return "24 and 96 frames end in the same bytes, five seeds"
 
 
@@ -83,8 +78,8 @@ def _dry() -> str:
     values = {"body": "quasi-static", "wounds": (), "transpiration": 50, "weight": 100, "water_content": 90}
     need = Need(fields=("volume", "least_jacobian", "water_lost"), stages=(0.0, 30.0), quality="preview")
     run = SOLVER.solve(SOLVER.parse(values, "orange"), need)
-    _demand(float(run.water_lost[1]) == 0.9, "not dry")
-    _demand(float(run.least_jacobian.min()) > 0, "inverted")
+    demand(float(run.water_lost[1]) == 0.9, "not dry")
+    demand(float(run.least_jacobian.min()) > 0, "inverted")
     left = float(run.volume[1] / run.volume[0])
     return f"volume {left:.3f} of the fresh one, least J {float(run.least_jacobian[1]):.2f}"
 
@@ -93,7 +88,7 @@ def _obtuse() -> str:
     points, faces = geodesic(16)
     flat = points * [1.0, 0.02, 1.0]
     said, surface, _ = _spread(flat, faces)
-    _demand(surface.weight.min() >= 0, "a negative weight")
+    demand(surface.weight.min() >= 0, "a negative weight")
     return said
 
 
@@ -108,7 +103,7 @@ def _inverted() -> str:
     points, faces = geodesic(16)
     said, _, there = _spread(points, faces)
     _, _, here = _spread(points, faces[:, ::-1].copy())
-    _demand(float(np.abs(here - there).max()) < 1e-9, "inside out is not the same")
+    demand(float(np.abs(here - there).max()) < 1e-9, "inside out is not the same")
     return said
 
 

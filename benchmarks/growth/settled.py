@@ -30,6 +30,7 @@ from solver.growth.settling.tangent import Tangent
 from solver.growth.settling.touching import touches
 from solver.growth.state import State
 from solver.growth.stepping import Carried, Steps
+from solver.linalg.abreast import finished
 
 _FOLDER = Path(__file__).parents[2] / "examples" / "growth"
 _GOAL, _FINER, _FINEST = 1e-3, 1e-3, 1e-6
@@ -48,12 +49,8 @@ def stepped(state: State, params: GrowthParams, distance: float) -> float:
     still = params.model_copy(update={"remesh": 0.0, "plasticity": 0.0})
     steps = Steps(still, _GOAL * _FINEST, 4000, np.inf, 10**9, 0.0, params.thickness)
     work = steps.step(state, Carried(Tangent(state.mesh), Habit(), distance), params.tools, params.solids, 0.0)
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            found: State = end.value[0]
-            return float(np.linalg.norm(found.x - state.x, axis=1).max()) / state.length
+    found, _ = finished(work)
+    return float(np.linalg.norm(found.x - state.x, axis=1).max()) / state.length
 
 
 def main() -> None:

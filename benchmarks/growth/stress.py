@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.growth.crossings import crossings
-from benchmarks.tries import Broken, show
+from benchmarks.tries import Broken, demand, show
 from solver import shell
 from solver.contract import InvalidGeometry, NotConverged, Unstable
 from solver.growth.engine import Engine
@@ -26,11 +26,6 @@ __all__ = [
 ]
 
 _RESIDUAL = 1e-3
-
-
-def _demand(fine: bool, what: str) -> None:
-    if not fine:
-        raise Broken(what)
 
 
 def _surface(**values: Any) -> dict[str, Any]:
@@ -53,12 +48,12 @@ def _told(engine: Engine, until: float, may_fail: bool = False) -> str:
         while engine.state.time < until - 1e-9:
             engine.advance(1e9, until=engine.state.time + engine.params.step)
     except (NotConverged, Unstable) as error:
-        _demand(may_fail, f"no equilibrium: {error}")
+        demand(may_fail, f"no equilibrium: {error}")
         said = f"{type(error).__name__} at {engine.state.time:.2g}, the equilibrium before stands; "
     state = engine.state
-    _demand(bool(np.isfinite(state.x).all()), "not finite")
-    _demand(engine.residual <= _RESIDUAL, f"residual {engine.residual:.1e}")
-    _demand(bool((shell.areas(state.g) > 0).all()), "a rest triangle without area")
+    demand(bool(np.isfinite(state.x).all()), "not finite")
+    demand(engine.residual <= _RESIDUAL, f"residual {engine.residual:.1e}")
+    demand(bool((shell.areas(state.g) > 0).all()), "a rest triangle without area")
     grown = shell.areas(state.g).sum() / begun
     return f"{said}{len(state.x)} vertices, rest area x{grown:.3g}, residual {engine.residual:.0e}"
 
@@ -88,7 +83,7 @@ def _folded() -> str:
         engine = Engine(GrowthParams.parse({**values, "contact": contact}), 250, _RESIDUAL)
         _told(engine, 1.0)
         ends.append(crossings(engine.state.x, engine.state.mesh.triangles))
-    _demand(ends[1] == 0, f"{ends[1]} crossings")
+    demand(ends[1] == 0, f"{ends[1]} crossings")
     return f"{ends[0]} edges through triangles without contact, none with"
 
 
@@ -96,7 +91,7 @@ def _still() -> str:
     engine = Engine(GrowthParams.parse({"tools": [], "imperfection": 0}), 200, _RESIDUAL)
     x = engine.state.x
     engine.advance(1e9, until=0.1)
-    _demand(bool(np.array_equal(x, engine.state.x)), "it moved")
+    demand(bool(np.array_equal(x, engine.state.x)), "it moved")
     return "the same bytes"
 
 
@@ -109,8 +104,8 @@ def _undone() -> str:
     engine.advance(0.0)
     while engine.undo():
         pass
-    _demand(bool(np.array_equal(engine.state.x, begun)), "not the start")
-    _demand(len(engine.script.tools) == 1, "a tool is left")
+    demand(bool(np.array_equal(engine.state.x, begun)), "not the start")
+    demand(len(engine.script.tools) == 1, "a tool is left")
     return "back at the start, the added tool forgotten"
 
 

@@ -26,6 +26,7 @@ from solver.growth.engine import Engine
 from solver.growth.params import GrowthParams
 from solver.growth.settling.tangent import Tangent
 from solver.growth.shapes import start
+from solver.linalg.abreast import finished
 from solver.linalg.multifrontal import factorise
 from solver.shell.inverse import Inverse, fronts_of, inverse_of
 from solver.shell.normals import normals
@@ -78,11 +79,7 @@ class Grown:
             self.fronts, self.tangent.pattern, self.blocks, normals(self.x, self.mesh.triangles),
             np.zeros(len(self.x), np.bool_),
         )  # fmt: skip
-        while True:
-            try:
-                next(work)
-            except StopIteration as end:
-                return end.value  # type: ignore[no-any-return]
+        return finished(work)
 
 
 def kernels(vertices: int) -> dict[str, tuple[float, float]]:

@@ -23,8 +23,9 @@ from typing import Any
 
 from benchmarks.figures import keep
 
+from .__main__ import cpu
 from .asking import closed_loop, open_loop, run
-from .served import CLIENTS, KINDS, path, said, serving, spent
+from .served import CLIENTS, KINDS, path, said, serving
 from .slow import beside_slow, report_slow
 
 #: Longest time for which a peak rate is measured [s].
@@ -59,18 +60,18 @@ class Watch(threading.Thread):
 def twice(process: subprocess.Popen[str], port: int, kind: str, seconds: float, turn: int) -> dict[str, Any]:
     """Measure the peak rate, then ask twice as often, then the peak again: the rate of a shared machine drifts."""
     seed, short = 10**7 * (turn + 1), min(seconds / 3, _PEAK)
-    moments = [spent(process.pid)]
+    moments = [cpu(process.pid)]
     before = run(closed_loop(port, path(kind, seed), CLIENTS, short))
     if not before.good:
         raise SystemExit(f"nothing was answered in {short:.0f} s of {kind}: ask for longer")
-    moments.append(spent(process.pid))
+    moments.append(cpu(process.pid))
     watch = Watch(process.pid)
     watch.start()
     over = run(open_loop(port, path(kind, seed + 10**6), 2 * before.rate, seconds, turn))
     seen = watch.stop()
-    moments.append(spent(process.pid))
+    moments.append(cpu(process.pid))
     after = run(closed_loop(port, path(kind, seed + 2 * 10**6), CLIENTS, short))
-    moments.append(spent(process.pid))
+    moments.append(cpu(process.pid))
     peak = (before.rate + after.rate) / 2
     # of what the server got: answers per second of its processor time
     each = [len(part.good) / (b - a) for part, a, b in zip((before, over, after), moments, moments[1:], strict=False)]

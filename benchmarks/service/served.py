@@ -10,7 +10,6 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
 from store import starter
@@ -18,7 +17,7 @@ from store import starter
 from .__main__ import ROOT, free_port
 from .asking import Found, closed_loop, run
 
-__all__ = ["CLIENTS", "KINDS", "path", "quantile", "said", "serving", "spent"]
+__all__ = ["CLIENTS", "KINDS", "path", "quantile", "said", "serving"]
 
 #: What is asked for: of the size that a page shows, and computed in the event loop; and one that a thread computes.
 KINDS = {"points, 64": "resolution=64&format=points", "GLB, 192": "resolution=192&format=glb"}
@@ -58,12 +57,6 @@ def serving() -> Iterator[tuple[subprocess.Popen[str], int]]:
             raise
         finally:
             process.send_signal(signal.SIGTERM)
-
-
-def spent(pid: int) -> float:
-    """Return the processor time of a process [s]."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def quantile(times: list[float], q: float) -> float:

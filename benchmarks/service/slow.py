@@ -12,9 +12,9 @@ from typing import Any
 
 from benchmarks.figures import keep
 
-from .__main__ import ROOT
+from .__main__ import ROOT, cpu
 from .asking import closed_loop, open_loop, run
-from .served import CLIENTS, KINDS, path, quantile, said, spent
+from .served import CLIENTS, KINDS, path, quantile, said
 
 __all__ = ["beside_slow", "report_slow"]
 
@@ -32,7 +32,7 @@ def slow(port: int, count: int) -> Iterator[Callable[[], float]]:
         try:
             assert process.stdout is not None
             process.stdout.readline()
-            yield lambda: spent(process.pid)
+            yield lambda: cpu(process.pid)
         finally:
             process.terminate()
 
@@ -73,9 +73,9 @@ def _asked(turns: list[tuple[tuple[int, int], float, int]]) -> list[dict[str, An
     """Ask each server (pid, port) at a rate for one turn, by a seed."""
     kind, found = next(iter(KINDS)), []
     for (pid, port), rate, seed in turns:
-        before = spent(pid)
+        before = cpu(pid)
         came = run(open_loop(port, path(kind, seed), rate, TURN, seed))
-        found.append({**said(came), "seconds": came.good, "server": (spent(pid) - before) / TURN})
+        found.append({**said(came), "seconds": came.good, "server": (cpu(pid) - before) / TURN})
     return found
 
 

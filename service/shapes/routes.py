@@ -93,7 +93,7 @@ async def at_once(request: Request, solver: str) -> Response | None:
     """Return a shape that is computed in the event loop, in its turn; None for what is better done in a thread.
 
     Raises:
-        ServiceError, StoreError, SolverError: as `_ask` and `_settle`, or too many wait already.
+        ServiceError, StoreError, SolverError: as `asking.read` and `_settle`, or too many wait already.
 
     """
     if _FOLDS in request.scope or not request.app.state.tables.is_open(asking.table_for(request, solver).name):

@@ -14,7 +14,7 @@ from typing import TypeVar
 
 from numba import config
 
-__all__ = ["abreast", "both", "two"]
+__all__ = ["abreast", "both", "finished", "two"]
 
 A = TypeVar("A")
 B = TypeVar("B")
@@ -84,7 +84,14 @@ def abreast(first: Generator[None, None, A], second: Generator[None, None, B]) -
         yield
 
 
-def _ended(work: Generator[None, None, A]) -> tuple[A] | None:
+def finished(work: Generator[object, None, A]) -> A:
+    """Go on with a generator to its end; returns its value."""
+    while not (end := _ended(work)):
+        pass
+    return end[0]
+
+
+def _ended(work: Generator[object, None, A]) -> tuple[A] | None:
     """Go on with a generator for a piece; returns its value once there is one."""
     try:
         next(work)

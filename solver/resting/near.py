@@ -237,7 +237,7 @@ def deepest_in_ground(
     at: Floats, turn: Floats, i: int, points: Floats, scale: float, reach: float, bowl: Floats, point: Floats,
     normal: Floats, near: Ints, depths: Floats, known: int, slack: float,
 ) -> tuple[float, int]:  # fmt: skip
-    """Find the point of body i that is deepest in the floor y = 0 or in the bowl's shell; `near` as in `_deepest`.
+    """Find the point of body i that is deepest in the floor y = 0 or in the bowl's shell; `near` as in `deepest_in`.
 
     bowl: radius of the inner sphere, thickness, height of the rim; radius 0 is no bowl. The inner sphere's lowest point
     lies `thickness` above the floor.

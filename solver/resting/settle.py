@@ -87,11 +87,6 @@ def settle(bodies: Sequence[Body], kinds: Sequence[int], sizes: Floats, bowl: Bo
         InvalidInput: there are too many for one pile.
 
     """
-    count = len(kinds)
-    if count > MOST:
-        raise InvalidInput(
-            f"{count} bodies are more than {MOST} of one pile.", advice=f"Make several piles of at most {MOST}."
-        )
     return Pouring(bodies, kinds, sizes, bowl, seed).rest()
 
 
@@ -131,11 +126,6 @@ class Pouring:
         self._fixed = kind, scale, tables, points, reach / unit, mass, inertia, shell
         self._batch, self._fastest, self._drag = 0, float("inf"), 0.05
         self._found: Rest | None = None
-
-    @property
-    def batches(self) -> int:
-        """Batches of steps that are done."""
-        return self._batch
 
     @property
     def centre(self) -> Floats:

@@ -21,7 +21,7 @@ from .contact import (
     search,
     within,
 )
-from .curvature import added_angles, from_angles, to_angles
+from .curvature import added_angles, from_angles
 from .halves import Halves
 from .hessian import bending_hessian, membrane_hessian, volume_hessian
 from .material import Material
@@ -65,7 +65,6 @@ __all__ = [
     "part_of",
     "pattern",
     "search",
-    "to_angles",
     "topology",
     "volume_hessian",
     "within",

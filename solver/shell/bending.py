@@ -24,11 +24,6 @@ def hinge_stiffness(g: Floats, mesh: Topology, flexural: float) -> Floats:
     return found
 
 
-def _squares(g: Floats) -> Floats:
-    """Return the squared rest edges (f, 3), edge k opposite to corner k."""
-    return np.stack([g[:, 0] + g[:, 2] - 2 * g[:, 1], g[:, 2], g[:, 0]], -1)
-
-
 @njit(cache=True, error_model="numpy")
 def _stiffness(g: Floats, hinge_faces: Ints, hinge_corners: Ints, flexural: float, found: Floats) -> None:
     for h in range(len(hinge_faces)):

@@ -11,19 +11,18 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Floats
-from .membrane import areas
+from .membrane import areas, squares
 from .topology import Topology
 
-__all__ = ["added_angles", "from_angles", "to_angles"]
+__all__ = ["added_angles", "from_angles"]
 
 
 def _heights(g: Floats) -> Floats:
     """Return heights (f, 3) over the edges opposite to corners 0, 1, 2."""
-    squares = np.stack([g[:, 0] + g[:, 2] - 2 * g[:, 1], g[:, 2], g[:, 0]], -1)
-    return 2 * areas(g)[:, None] / np.sqrt(squares)
+    return 2 * areas(g)[:, None] / np.sqrt(squares(g))
 
 
-def to_angles(b: Floats, g: Floats) -> Floats:
+def _to_angles(b: Floats, g: Floats) -> Floats:
     """Return the angles (f, 3) of triangles with second forms b (f, 3: b11, b12, b22) and rest metrics g (f, 3)."""
     b11, b12, b22 = b.T
     return np.stack([b12, b11 - b12, b22 - b12], -1) / (2 * _heights(g))
@@ -31,7 +30,7 @@ def to_angles(b: Floats, g: Floats) -> Floats:
 
 def added_angles(b: Floats, g: Floats, mesh: Topology) -> Floats:
     """Return the angles (h,) of hinges between triangles with second forms b (f, 3)."""
-    sides = to_angles(b, g)
+    sides = _to_angles(b, g)
     found: Floats = sides[mesh.hinge_faces, mesh.hinge_corners].sum(axis=1)
     return found
 

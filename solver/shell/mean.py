@@ -15,8 +15,8 @@ import numpy as np
 from numba import njit
 
 from ..arrays import Floats, Ints
-from .bending import _squares, hinge_slopes
-from .membrane import areas
+from .bending import hinge_slopes
+from .membrane import areas, squares
 from .topology import Topology
 
 __all__ = ["mean_bending", "mean_stiffness"]
@@ -25,7 +25,7 @@ __all__ = ["mean_bending", "mean_stiffness"]
 def mean_stiffness(g: Floats, mesh: Topology, flexural: float) -> tuple[Floats, Floats]:
     """Return l / 4 of hinges (h,) and 2 D / A of vertices (n,) from rest metrics g (f, 3); vertices without area 0."""
     a, b = mesh.hinge_faces.T
-    square = 0.5 * (_squares(g)[a, mesh.hinge_corners[:, 0]] + _squares(g)[b, mesh.hinge_corners[:, 1]])
+    square = 0.5 * (squares(g)[a, mesh.hinge_corners[:, 0]] + squares(g)[b, mesh.hinge_corners[:, 1]])
     area = np.bincount(mesh.triangles.ravel(), np.repeat(areas(g) / 3, 3), mesh.vertices)
     return 0.25 * np.sqrt(square), np.where(area > 0, 2 * flexural / np.maximum(area, 1e-300), 0.0)
 

@@ -14,7 +14,7 @@ from numba import njit
 from ..arrays import Floats, Ints
 from ..contract import InvalidGeometry
 
-__all__ = ["areas", "membrane", "membrane_tangent", "metric", "metric_of_lengths"]
+__all__ = ["areas", "membrane", "membrane_tangent", "metric", "metric_of_lengths", "squares"]
 
 
 def metric(x: Floats, triangles: Ints) -> Floats:
@@ -39,6 +39,11 @@ def metric_of_lengths(lengths: Floats) -> Floats:
             advice="Grow neighbouring edges together, or give tensors instead of lengths.",
         )
     return found
+
+
+def squares(g: Floats) -> Floats:
+    """Return the squared edges (f, 3) of metrics g (f, 3), edge k opposite to corner k."""
+    return np.stack([g[:, 0] + g[:, 2] - 2 * g[:, 1], g[:, 2], g[:, 0]], -1)
 
 
 def areas(g: Floats) -> Floats:

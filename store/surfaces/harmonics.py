@@ -48,11 +48,10 @@ def degrees(spectrum: Array) -> Array:
     return np.moveaxis(found, -1, 0).reshape(*lead, band + 1, band + 1)
 
 
-def power(harmonics: Array, other: Array | None = None) -> Array:
-    """Return the mean product by degree (..., l) of two fields' harmonics (..., m, l), or the mean square of one."""
-    other = harmonics if other is None else other
-    products = harmonics.real * other.real + harmonics.imag * other.imag
-    found: Array = 2 * products.sum(axis=-2) - products[..., 0, :]
+def power(harmonics: Array) -> Array:
+    """Return the mean square by degree (..., l) of a field's harmonics (..., m, l)."""
+    squares = harmonics.real**2 + harmonics.imag**2
+    found: Array = 2 * squares.sum(axis=-2) - squares[..., 0, :]
     return found
 
 

@@ -28,6 +28,8 @@ __all__ = ["Plane", "cut", "picture", "plane"]
 
 _INK, _FLESH, _CORE = "#3a2a24", "#efe3c8", "#8a6a4c"
 _PLAIN = np.array([0.36, 0.10, 0.06])
+#: Of a stage's picture, along and down.
+_PIXELS = 320
 
 
 class Plane(NamedTuple):
@@ -82,7 +84,7 @@ def cut(vertices: Array, triangles: Array, where: Plane, values: Array | None = 
     return segments, (values[first] * (1 - share) + values[others] * share).mean(axis=1)
 
 
-def picture(run: xr.Dataset, where: Plane, *, title: str = "", symbol: str = "s", pixels: int = 320) -> bytes:
+def picture(run: xr.Dataset, where: Plane, *, title: str = "", symbol: str = "s") -> bytes:
     """Return a PNG of all stages of a result cut along a plane, at one scale.
 
     Raises:
@@ -98,11 +100,11 @@ def picture(run: xr.Dataset, where: Plane, *, title: str = "", symbol: str = "s"
     reach = 1.15 * max(float(np.abs(segments).max(initial=1e-9)) for segments, _ in cuts)
     core = _core(run, where)
     paper = tuple(BACKGROUND ** (1 / 2.2))
-    width, height = 16 + pixels * len(cuts) + 16, pixels + 118
+    width, height = 16 + _PIXELS * len(cuts) + 16, _PIXELS + 118
     figure = Figure(figsize=(width / 100, height / 100), dpi=100, facecolor=paper)
     canvas = FigureCanvasAgg(figure)
     for i, (segments, colour) in enumerate(cuts):
-        axes = figure.add_axes(((16 + i * pixels) / width, 34 / height, pixels / width, pixels / height))
+        axes = figure.add_axes(((16 + i * _PIXELS) / width, 34 / height, _PIXELS / width, _PIXELS / height))
         if "colatitude" in run.dims:  # seen whole from the centre, so the fan of triangles is the inside
             fan = np.concatenate([np.zeros((len(segments), 1, 2)), segments], axis=1)
             axes.add_collection(PolyCollection(list(fan), facecolors=_FLESH, edgecolors=_FLESH, linewidths=0.6))
@@ -115,7 +117,7 @@ def picture(run: xr.Dataset, where: Plane, *, title: str = "", symbol: str = "s"
         axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
         axes.set_axis_off()
         label = f"{symbol} = {float(run['stage'][i]):g}"
-        figure.text((16 + (i + 0.5) * pixels) / width, 1 - 66 / height, label, fontsize=11, color=_INK, ha="center")
+        figure.text((16 + (i + 0.5) * _PIXELS) / width, 1 - 66 / height, label, fontsize=11, color=_INK, ha="center")
     heading = ", ".join(word for word in (title, where.title) if word)
     written = figure.text(16 / width, 1 - 28 / height, heading, fontsize=13, color=_INK, va="center", fontweight="bold")
     fit(written, 13, width - 24)

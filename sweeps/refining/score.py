@@ -32,6 +32,8 @@ __all__ = ["Case", "Report", "Row", "cases", "picture", "score"]
 
 #: Parameters of a run that change its pattern but not what it is like.
 _SEED = "seed"
+#: Cases that a picture shows at most.
+_SHOWN = 5
 
 
 @dataclass(frozen=True)
@@ -135,27 +137,28 @@ def score(
     return Report(rows, held_out, [case.label for case in found], len(pairs), table.neighbour_correlation)
 
 
-def picture(found: Sequence[Case], stage: float, pixels: int = 260, most: int = 5) -> bytes:
+def picture(found: Sequence[Case], stage: float) -> bytes:
     """Return a PNG of truth, the paper's inverse distance and the default, side by side for each case."""
 
     def panel(case: Case, displacement: Array) -> Panel:
         return Panel(case.fresh + displacement)
 
+    shown = found[:_SHOWN]
     rows = [
         [
             panel(case, case.truth(stage)),
             panel(case, case.found("idw", stage)),
             panel(case, case.found(methods.DEFAULT, stage)),
         ]
-        for case in found[:most]
+        for case in shown
     ]
     labels = ("truth", "the paper's (idw)", f"default ({methods.DEFAULT})")
     return sheet(
         rows,
         title=f"between samples, s = {stage:g}",
         column_labels=labels,
-        row_labels=[case.label.replace(", ", "\n") for case in found[:most]],
-        pixels=pixels,
+        row_labels=[case.label.replace(", ", "\n") for case in shown],
+        pixels=260,
     )
 
 

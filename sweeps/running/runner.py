@@ -104,7 +104,6 @@ def run_queue(
     stop: threading.Event,
     patience: float = math.inf,
     observe: Callable[[Event], None] | None = None,
-    lease: float = LEASE,
 ) -> int:
     """Run what is asked for in the store's queue, as it comes; return how many jobs were solved.
 
@@ -117,7 +116,7 @@ def run_queue(
         SweepError: the cluster went away.
 
     """
-    run = Run([], store, executor, "", observe, lease, stop, time.monotonic)
+    run = Run([], store, executor, "", observe, LEASE, stop, time.monotonic)
     _drive(run, run.drain(patience), stop)
     return run.solved
 

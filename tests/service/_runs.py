@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import trimesh
 import xarray as xr
+from typer.testing import CliRunner
 
+from service.cli import app
 from service.sequences import EXPORTS, Options, prepared, write
 from solver import meshes, registry
 from solver.fruit import directions, lattice
@@ -38,6 +40,13 @@ def splitting(metres: float = 0.01) -> xr.Dataset:
         for s in solids
     ]
     return xr.Dataset(meshes.changing(frames), {"stage": list(STAGES)}, {"metres_per_unit": metres, "solver": "growth"})
+
+
+def wizen(*words: str) -> str:
+    """What a command says that has to succeed."""
+    done = CliRunner().invoke(app, list(words))
+    assert done.exit_code == 0, done.output
+    return done.output
 
 
 def made(run: xr.Dataset, name: str, stage: float | None = None, **options: object) -> bytes:

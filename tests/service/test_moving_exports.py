@@ -19,13 +19,9 @@ from solver.contract import Need
 from solver.decay import SOLVER
 from store import shards
 
+from ._runs import wizen
+
 BODY = "--preset tomato --quality preview --stages 0,4,8 --set body=quasi-static --set skin={} --set te=0.03"
-
-
-def wizen(*words: str) -> str:
-    done = CliRunner().invoke(app, list(words))
-    assert done.exit_code == 0, done.output
-    return done.output
 
 
 def motion(frames: list[np.ndarray]) -> float:

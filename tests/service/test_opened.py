@@ -22,7 +22,7 @@ from solver.decay import SOLVER
 from store import shards
 
 from ._gltf import accessor, parsed
-from ._runs import made, rotting, shrinking
+from ._runs import made, rotting, shrinking, wizen
 
 #: A plane off the middle that no axis lies in, and how far it is from the middle.
 NORMAL = np.array([1.0, 2.0, 2.0]) / 3
@@ -160,11 +160,6 @@ def test_nothing_is_made_up_of_an_inside_that_nobody_knows() -> None:
 
 
 def test_commands_cut_a_run_open(tmp_path: Path) -> None:
-    def wizen(*words: str) -> str:
-        done = CliRunner().invoke(app, list(words))
-        assert done.exit_code == 0, done.output
-        return done.output
-
     words = "solve decay --preset apple --quality preview --resolution 24 --stages 0,6 --cut 0,0,0,0,0,1 --out"
     wizen(*words.split(), str(tmp_path / "open.png"))
     with Image.open(tmp_path / "open.png") as picture:

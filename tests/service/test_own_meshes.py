@@ -171,9 +171,9 @@ def test_a_usdz_has_each_stage_s_textures_on_the_mesh_s_own_coordinates(
         np.asarray(Image.open(io.BytesIO(archive.read(asset.Get(at).path))), float).reshape(-1, 3) for at in (1, 13)
     )
     assert len(fresh) == 64**2
-    # it rots: most texels are no longer red
+    # it rots: a quarter of the texels are no longer red
     assert (fresh[:, 0] > 2 * fresh[:, 1]).mean() > 0.9
-    assert old.mean() < fresh.mean() - 5 or np.abs(old - fresh).max() > 50
+    assert (old[:, 0] > 2 * old[:, 1]).mean() < 0.85
 
 
 @pytest.mark.parametrize("name", ["usdc", "usdz"])

@@ -16,8 +16,6 @@ from ._gltf import parsed
 from ._jobs import bearer, body, drain
 from .conftest import QUERY, SHAPE, client_of
 
-Json = dict[str, Any]
-
 pytestmark = pytest.mark.usefixtures("shrinking")
 
 

@@ -14,15 +14,11 @@ from typer.testing import CliRunner
 from service.cli import app
 from store import shards
 
+from ._runs import wizen
+
 #: A block meets a branchlet at some 12 ms.
 TWIG = ["solve", "wood", "--preset", "twig", "--set", "rods=7", "--set", "vertices=12", "--quality", "preview"]
 TWIG += ["--stages", "0,0.005", "--out"]
-
-
-def wizen(*words: str) -> str:
-    done = CliRunner().invoke(app, list(words))
-    assert done.exit_code == 0, done.output
-    return done.output
 
 
 def parts(points: np.ndarray, faces: np.ndarray) -> tuple[float, int]:

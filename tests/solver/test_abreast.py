@@ -59,14 +59,6 @@ def started(monkeypatch) -> list[str]:
     return names
 
 
-def drained(work):
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            return end.value
-
-
 @pytest.mark.parametrize("leaf_size", [3, 20, 10_000])
 def test_single_factors_and_what_they_solve_are_the_same(leaf_size, use, monkeypatch):
     x, pattern, blocks, _ = springs(n=400)
@@ -82,7 +74,7 @@ def test_single_factors_and_what_they_solve_are_the_same(leaf_size, use, monkeyp
         use(count)
         names = started(monkeypatch)
         work = abreast.abreast(*(factor(fronts, pattern.indptr, pattern.indices, data) for data in matrices))
-        factors, solved = drained(work), np.empty_like(right)
+        factors, solved = abreast.finished(work), np.empty_like(right)
         substitute(right, normals, fronts, *factors, solved)
         found[count] = [part.tobytes() for part in (*factors, solved)]
         # one leaf has no halves to share
@@ -287,5 +279,5 @@ def count_to(number: int, pieces: list[float]) -> Generator[None, None, int]:
 @pytest.mark.parametrize(("one", "other"), [(3, 3), (2, 5), (5, 2), (0, 4)])
 def test_generators_of_any_length_come_to_their_end(one, other, threads):
     pieces: list[float] = []
-    assert drained(abreast.abreast(count_to(one, pieces), count_to(other, pieces))) == (one, other)
+    assert abreast.finished(abreast.abreast(count_to(one, pieces), count_to(other, pieces))) == (one, other)
     assert len(pieces) == one + other

@@ -67,5 +67,11 @@ def test_a_shape_is_called_by_its_preset_or_its_table(tmp_path: Path, titles: li
     assert {"te = 0.034", "gamma = 22"} <= set(titles[-1][0].removeprefix("default: ").split(", "))
 
 
+def test_what_hours_come_to_is_said_hour_by_hour() -> None:
+    """Stages are in their own order, and what is as dry after other hours is one of them."""
+    said = wizen("solve", "dehydration", "--preset", "raisin", "--hours", "48,24", "--max-seconds", "0").stderr
+    assert said.startswith("s = 0.168847 after 48 h, 0.091224 after 24 h\n")
+
+
 def test_long_values_are_left_out_of_titles() -> None:
     assert shown(["te=0.04", "mesh=@fruit.obj", f"wounds=[{'1, ' * 20}]"]) == "te = 0.04, mesh = @fruit.obj, wounds = …"

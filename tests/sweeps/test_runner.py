@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
-from conftest import Solves
+from conftest import Solves, until
 
 from store.ledger.ledger import MAX_LOST
 from store.store import Store
@@ -293,13 +293,6 @@ def start(script: Path, plan: Path, store: Store) -> subprocess.Popen[bytes]:
     return subprocess.Popen(command, env=environment, start_new_session=True)
 
 
-def wait_until(happened: Callable[[], bool], seconds: float = 60) -> None:
-    deadline = time.monotonic() + seconds
-    while not happened():
-        assert time.monotonic() < deadline, "it did not happen"
-        time.sleep(0.02)
-
-
 def test_killing_everything_loses_nothing_reported(
     shrinking: Solves, tmp_path: Path, write_plan: Write, store: Store
 ) -> None:
@@ -307,7 +300,7 @@ def test_killing_everything_loses_nothing_reported(
     path = write_plan("[0.01, 0.02, 0.03, 0.04, 0.05]", more='trouble = "waits"')
     shrinking.hold(5)
     running = start(sweep_script(tmp_path), path, store)
-    wait_until(lambda: store.ledger.counts()["done"] >= 3)
+    until(lambda: store.ledger.counts()["done"] >= 3)
     os.killpg(running.pid, signal.SIGKILL)
     running.wait()
     reported, before = {job.key for job in store.ledger.jobs("done")}, len(shrinking)
@@ -325,7 +318,7 @@ def test_killing_everything_loses_nothing_reported(
 def test_workers_end_with_a_killed_parent(shrinking: Solves, tmp_path: Path, write_plan: Write, store: Store) -> None:
     """Kill only the sweep: its workers end by themselves, and hold no job."""
     running = start(sweep_script(tmp_path), write_plan(more="pause = 30"), store)
-    wait_until(lambda: len(shrinking) >= 2)
+    until(lambda: len(shrinking) >= 2)
     running.kill()
     running.wait()
 
@@ -336,7 +329,7 @@ def test_workers_end_with_a_killed_parent(shrinking: Solves, tmp_path: Path, wri
             return True
         return False
 
-    wait_until(gone)
+    until(gone)
 
 
 @pytest.mark.slow

@@ -8,12 +8,11 @@ import signal
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import pytest
-from conftest import Solves
+from conftest import Solves, until
 
 from store.store import Store
 from sweeps.planning.plan import Plan
@@ -26,13 +25,6 @@ Write = Callable[..., Path]
 ROOT = Path(__file__).parents[2]
 #: Far less than the ten minutes that a hanging solver takes, far more than the two seconds of a machine at rest.
 SOON = 20.0
-
-
-def until(happened: Callable[[], bool], seconds: float = 60) -> None:
-    deadline = time.monotonic() + seconds
-    while not happened():
-        assert time.monotonic() < deadline, "it did not happen"
-        time.sleep(0.02)
 
 
 def command(*words: object, within: Sequence[str] = ()) -> subprocess.Popen[str]:

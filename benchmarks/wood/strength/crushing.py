@@ -32,7 +32,7 @@ CRUSHES = {"spruce": 38.7e6, "beech": 50.3e6, "green spruce": 18.4e6, "green bee
 _SCATTER = {"crushing": 0.18, "rupture": 0.16, "rupture without crushing": 0.16}
 _HEAD = ("species", "test", "seed", "quantity", "measured", "published", "scatter", "in it", "rods broken",
          "bonds broken", "CPU s")  # fmt: skip
-_SIDE, _TALL, _SPAN = 0.025, 0.1, 0.36
+_SIDE, _TALL = 0.025, 0.1
 
 
 def tension(rupture: float, crushes: float) -> float:

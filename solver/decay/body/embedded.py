@@ -18,7 +18,7 @@ from ..params import DecayParams
 from ..surfaces.imported import extent_of, rays_from
 from ..surfaces.places import Neighbour
 from ..surfaces.surface import Surface, extent
-from .rind import rind
+from .rind import place, rind
 from .solid import Solid, volumes
 
 __all__ = ["Embedded"]
@@ -129,7 +129,7 @@ def _filled(points: Floats, faces: Ints, layers: int, far: float) -> tuple[Stuff
             worst = int(np.argmax(away))
             if away[worst] <= far * edge:
                 return found, far * edge
-            why = f"it is too thin at {_place(points[worst])}"
+            why = f"it is too thin at {place(points[worst])}"
             # a tip is too sharp for every lattice: what is hardly longer than an edge of the one asked for goes along
             for most in (far, _TIP):
                 if away[worst] <= most * asked:
@@ -153,7 +153,7 @@ def _lacking(found: Stuffed) -> str:
     count, of = pieces(found.tets, len(found.points))
     if count > 1:
         least = int(np.argmin(np.bincount(of)))
-        return f"a part about {_place(found.points[of == least].mean(axis=0))} does not hang together with the rest"
+        return f"a part about {place(found.points[of == least].mean(axis=0))} does not hang together with the rest"
     return ""
 
 
@@ -173,10 +173,6 @@ def _buried(found: Stuffed, points: Floats, away: Floats, far: float) -> Bools:
     middles = KDTree(found.points[found.tets].mean(axis=1))
     deep[deep] = middles.query(points[deep])[0] < away[deep]
     return np.asarray(deep)
-
-
-def _place(point: Floats) -> str:
-    return "(" + ", ".join(f"{x:.3g}" for x in point) + ")"
 
 
 def _matrix(found: Nearest, faces: Ints, count: int) -> sparse.csr_array:

@@ -42,10 +42,6 @@ class Obstacles(NamedTuple):
             found.append((inside, radius - far[inside], away[inside] / np.maximum(far[inside], 1e-300)[:, None]))
         return [part for part in found if len(part[0])]
 
-    def deepest(self, x: Floats) -> float:
-        """Return how deep a point (v, 3) is in something at most [r1]."""
-        return max((float(depth.max()) for _, depth, _ in self.depths(x)), default=0.0)
-
     def laid(self, x: Floats) -> Floats:
         """Return points (v, 3) moved out of everything by the shortest way."""
         moved = x.copy()

@@ -12,7 +12,7 @@ from ...arrays import Floats, Ints
 from ...contract import InvalidGeometry
 from ...shell.normals import normals
 
-__all__ = ["rind"]
+__all__ = ["place", "rind"]
 
 
 def rind(points: Floats, faces: Ints, thickness: float) -> tuple[Floats, Ints]:
@@ -27,13 +27,13 @@ def rind(points: Floats, faces: Ints, thickness: float) -> tuple[Floats, Ints]:
     shared = uses[back.ravel()]
     if shared.max() > 2:
         raise InvalidGeometry(
-            f"{int(shared.max())} triangles share an edge at {_place(points[ends[np.argmax(shared), 0]])}.",
+            f"{int(shared.max())} triangles share an edge at {place(points[ends[np.argmax(shared), 0]])}.",
             advice="An open mesh gets a rind of flesh where no more than two do. Split it there, or take body=none.",
         )
     first, count = np.unique(ends, axis=0, return_counts=True)
     if count.max() > 1:
         raise InvalidGeometry(
-            f"neighbouring triangles are wound opposite ways at {_place(points[first[np.argmax(count), 0]])}.",
+            f"neighbouring triangles are wound opposite ways at {place(points[first[np.argmax(count), 0]])}.",
             advice="Wind them alike: an open mesh has its flesh on the side that they face from.",
         )
     inner = points - thickness * normals(points, faces)
@@ -43,5 +43,6 @@ def rind(points: Floats, faces: Ints, thickness: float) -> tuple[Floats, Ints]:
     return np.concatenate([points, inner]), np.concatenate([faces, faces[:, ::-1] + far, strip])
 
 
-def _place(point: Floats) -> str:
+def place(point: Floats) -> str:
+    """Return a point as errors say it."""
     return "(" + ", ".join(f"{x:.3g}" for x in point) + ")"

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays import Floats, Ints
 from ...contract import NotConverged
+from ...linalg.abreast import finished
 from ...linalg.dissection import Fronts
 from ...shell import (
     Material,
@@ -171,12 +172,8 @@ class Shell:
         for inside, _, way in obstacles.depths(x):
             firm = _FIRM * self._hold[inside, None, None]
             np.add.at(blocks, self._pattern.diagonal[inside], firm * way[:, :, None] * way[:, None, :])
-        pieces = inverse_of(self._fronts, self._pattern, blocks, normals(x, self._faces), np.zeros(len(x), np.bool_))
-        while True:
-            try:
-                next(pieces)
-            except StopIteration as end:
-                return cast(Inverse, end.value)
+        outward, still = normals(x, self._faces), np.zeros(len(x), np.bool_)
+        return finished(inverse_of(self._fronts, self._pattern, blocks, outward, still))
 
     def _slope(
         self, x: Floats, carried: Floats, g: Floats, stiffness: Floats, obstacles: Obstacles

@@ -23,7 +23,8 @@ from ..fields.system import System
 from ..names import BODY, MOULD
 from ..params import DecayParams, Wound
 from ..settings import Settings, choose, moved
-from ..surfaces.surface import Surface, extent, geodesic
+from ..surfaces.shape import volume_of
+from ..surfaces.surface import extent, geodesic
 from .air import between
 from .bodies import TOUCHING, Bodies, Shaped, headroom, overlap, stiff
 from .infection import Exposure
@@ -233,9 +234,9 @@ class HeapRun:
         mass, water, juice, respired = share @ sums
         lot, size = self._lot, self._lying.size
         each = [lot.surfaces[k] for k in lot.kind]
-        volume = sum(_volume(p, surface) for p, surface in zip(points.astype(float), each, strict=True))
+        volume = sum(volume_of(p, surface) for p, surface in zip(points.astype(float), each, strict=True))
         fresh = sum(
-            _volume(surface.points, surface) * float(np.sum(size[lot.kind == k] ** 3))
+            volume_of(surface.points, surface) * float(np.sum(size[lot.kind == k] ** 3))
             for k, surface in enumerate(lot.surfaces)
         )
         found: dict[str, Any] = {
@@ -318,8 +319,3 @@ def _shared(parts: Floats) -> Floats:
 def _asks(context: Context) -> bool:
     context.check_cancelled()
     return False
-
-
-def _volume(points: Floats, surface: Surface) -> float:
-    a, b, c = (points[surface.faces[:, k]] for k in range(3))
-    return abs(float(np.sum(a * np.cross(b, c)))) / 6

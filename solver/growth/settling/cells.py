@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from ... import shell
-from ...arrays import Bools, Floats, Ints
+from ...arrays import Floats, Ints
 from ...contract import InvalidGeometry
 from ...linalg.patterns import of_pairs
 
@@ -44,7 +44,7 @@ def coarser(mesh: shell.Topology, x: Floats) -> Coarser | None:
     first = np.unique(mesh.edges[mesh.border])
     rim = np.zeros(mesh.vertices, np.bool_)
     rim[first] = True
-    seeds = _spread(indptr, indices, rim, np.concatenate([first, np.flatnonzero(~rim)]), _RINGS)
+    seeds = _spread(indptr, indices, np.concatenate([first, np.flatnonzero(~rim)]), _RINGS)
     cell = _cells(indptr, indices, x, seeds)
     between = cell[mesh.triangles]
     between = between[(between != np.roll(between, 1, axis=1)).all(axis=1)]
@@ -97,8 +97,8 @@ def _slopes(y: Floats, edges: Ints, moved: Floats) -> Floats:
 
 
 @njit(cache=True)
-def _spread(indptr: Ints, indices: Ints, rim: Bools, order: Ints, rings: int) -> Ints:
-    """Return vertices, in order, none of which is within so many rings of another; on the rim, rings along it."""
+def _spread(indptr: Ints, indices: Ints, order: Ints, rings: int) -> Ints:
+    """Return vertices, in order, none of which is within so many rings of another."""
     n = len(indptr) - 1
     covered = np.zeros(n, np.bool_)
     seen = np.full(n, -1)

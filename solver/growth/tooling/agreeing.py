@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...arrays import Floats, Ints
+from ...shell.membrane import squares
 
 __all__ = ["agreed"]
 
@@ -27,15 +28,10 @@ def agreed(before: Floats, after: Floats, ratios: Floats, face_edges: Ints, edge
     """
     at = face_edges.ravel()
     mean = np.bincount(at, ratios.ravel(), edges) / np.maximum(np.bincount(at, minlength=edges), 1)
-    a, b, c = (_squares(before) * mean[face_edges]).T
+    a, b, c = (squares(before) * mean[face_edges]).T
     found = np.stack([c, (b + c - a) / 2, b], -1)
     sound = _determinant(found) > _LEAST * _determinant(after)
     return np.where(sound[:, None], found, after)
-
-
-def _squares(g: Floats) -> Floats:
-    """Return the squared edges (m, 3) of metrics."""
-    return np.stack([g[:, 0] + g[:, 2] - 2 * g[:, 1], g[:, 2], g[:, 0]], -1)
 
 
 def _determinant(g: Floats) -> Floats:

@@ -31,7 +31,6 @@ __all__ = [
     "Tool",
     "clocked",
     "intensities",
-    "intensity",
 ]
 
 #: Control points of a curve that is made about an apex.
@@ -253,11 +252,6 @@ def clocked(tool: Tool) -> bool:
 
 
 Tool = Annotated[HotSpot | HotCurve | HotSurface | HotStroke | HotTensors, Field(discriminator="kind")]
-
-
-def intensity(tool: Tool, time: float) -> float:
-    """Return the intensity of a tool at a growth time, 0 outside its duration."""
-    return float(intensities(tool, np.array([time - tool.start]))[0])
 
 
 def intensities(tool: Tool, since: Floats) -> Floats:

@@ -13,7 +13,7 @@ from ..model.plan import CURVE
 
 __all__ = ["ON_CURVE", "curve", "uncurve"]
 
-#: Rows of a part's edges, see `rods.ROWS`: tangent, inverse length, force on the edge; the edge, p, q, forces on them.
+#: Rows of a part's edges, see `rods`: tangent, inverse length, force on the edge; the edge, p, q, forces on them.
 _T, _INVERSE, _FORCE, _E, _P, _Q, ON_CURVE = 6, 10, 11, 20, 23, 26, 29
 
 

@@ -103,7 +103,7 @@ class Stiffness:
             out[self.diagonal, c, c] += diagonal
         return out
 
-    def matrix(self, x: np.ndarray, rods: Rods, bonds: Bonds, diagonal: float = 0.0) -> sp.bsr_matrix:
-        """Return K [N/m] with `diagonal` added, over the free degrees of freedom."""
-        data = self.blocks(x, rods, bonds, diagonal)
+    def matrix(self, x: np.ndarray, rods: Rods, bonds: Bonds) -> sp.bsr_matrix:
+        """Return K [N/m] over the free degrees of freedom."""
+        data = self.blocks(x, rods, bonds)
         return sp.bsr_matrix((data, self.indices, self.indptr), shape=(3 * self.size, 3 * self.size))

@@ -36,7 +36,7 @@ class Scratch(NamedTuple):
 
     f: np.ndarray
     seats: np.ndarray  # (2, s, 8) place [m] and slope of every seat of the plan; force [N] and what pulls on it [N m]
-    rows: np.ndarray  # of the plan's parts (p, rows, m), see `rods.ROWS`
+    rows: np.ndarray  # of the plan's parts (p, rows, m), see `plan.ROWS`
     t: np.ndarray
     inverse: np.ndarray
     torque: np.ndarray

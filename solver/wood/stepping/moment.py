@@ -68,10 +68,10 @@ def strength(wood: Wood, params: WoodParams) -> float:
     return float(wood.rods.k @ wood.rods.rest) * params.strain_limit / params.length
 
 
-def reached(time: float, state: State, start: float, error: float, sound: bool) -> Reached:
+def reached(time: float, state: State, start: float, error: float) -> Reached:
     """Return what is reported of a stage that was solved rather than marched to."""
     elastic, lost, work = float(state.books[: CONTACT + 1].sum()), float(state.books[LOST]), float(state.books[WORK])
-    return Reached(time, state, (kinetic(state.wood), elastic, lost, work, start), error, sound)
+    return Reached(time, state, (kinetic(state.wood), elastic, lost, work, start), error, True)
 
 
 def begin(wood: Wood) -> State:

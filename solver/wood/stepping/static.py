@@ -217,5 +217,5 @@ def static(wood: Wood, params: WoodParams, times: Sequence[float], context: Cont
             _bears(state, params, wanted)
         way = state.wood.motion.x - before
         state.books[WORK] += float(((load + state.wood.motion.load) / 2 * way).sum())
-        yield reached(wanted, copied(state._replace(steps=state.steps + 1)), start, error, True)
+        yield reached(wanted, copied(state._replace(steps=state.steps + 1)), start, error)
         state = state._replace(steps=state.steps + 1)

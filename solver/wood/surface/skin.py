@@ -62,9 +62,9 @@ class Skin:
         group, places = aligned(single, begin, found, section, self._pairs, holds)
         sheets = _Sheets(len(places))
         _walls(sheets, found, section, begin, row, number, group, covered, self._bark(found, row, number))
-        _ends(sheets, found, section, begin, row, group)
+        _ends(sheets, found, begin, row, group)
         vertices, inside = sheets.vertices(places)
-        faces = self._broken_faces(sheets, found, begin, row, number, away, single, len(vertices))
+        faces = self._broken_faces(found, begin, row, number, away, single, len(vertices))
         rough = np.concatenate([vertices, *(points for points, _ in faces)])
         triangles = np.concatenate([sheets.triangles(), *(t for _, t in faces)])
         inside = np.concatenate([inside, np.ones(len(rough) - len(inside))])
@@ -91,7 +91,6 @@ class Skin:
 
     def _broken_faces(
         self,
-        sheets: _Sheets,
         found: Rows,
         begin: np.ndarray,
         row: np.ndarray,
@@ -227,9 +226,7 @@ def _walls(
         sheets.add(sheet, np.concatenate([np.stack([a, b, c], 1)[of], np.stack([a, c, d], 1)[of]]))
 
 
-def _ends(
-    sheets: _Sheets, found: Rows, section: Section, begin: np.ndarray, row: np.ndarray, group: np.ndarray
-) -> None:
+def _ends(sheets: _Sheets, found: Rows, begin: np.ndarray, row: np.ndarray, group: np.ndarray) -> None:
     """Add the bundle's two ends: fans about the rods."""
     for station, far in ((0, False), (found.at.shape[1] - 1, True)):
         ends = found.at[:, station]
@@ -244,5 +241,5 @@ def _ends(
         b = group[following]
         if not far:
             a, b = b, a
-        offset = 2 * sheets._groups
+        offset = _END * sheets._groups
         sheets.add(0, np.stack([middle[row[mine]], a + offset, b + offset], 1))

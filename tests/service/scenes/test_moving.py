@@ -12,7 +12,6 @@ from service.scenes.compose import make
 from service.scenes.errors import InvalidScene
 from service.scenes.kinds.kind import COARSE
 from service.scenes.request import parse
-from service.shapes.live import LiveTables
 from solver.registry import surface
 from store import starter
 from store.lookup import ShapeTable
@@ -20,15 +19,10 @@ from store.lookup import ShapeTable
 from .._gltf import parsed
 from .._shapes import RAISIN_AT
 from ._reading import array, instances, placed
-from .test_scenes import CAMERA, complaints
+from .test_scenes import CAMERA, TABLES, complaints, made
 
-TABLES = LiveTables(starter.ROOT, 60.0)
 CURVE = [[0.5, 0.0], [2.0, 0.1], [3.0, 0.25]]
 ITEM: dict[str, Any] = {"preset": "raisin", "curve": CURVE, "transforms": [{"position": [1, 0, 0]}, {"scale": 0.5}]}
-
-
-def made(items: list[dict[str, Any]], to: str = "glb", compress: bool = False, **more: Any) -> Any:
-    return make(parse({"camera": CAMERA, "items": items, **more}), TABLES, 512, to, compress)
 
 
 def own(stage: float, n: int) -> np.ndarray:

@@ -16,17 +16,9 @@ from solver.growth.settling.coarser import begun_coarser
 from solver.growth.settling.energy import StepEnergy
 from solver.growth.settling.minimise import longest
 from solver.growth.settling.tangent import Tangent
+from solver.linalg.abreast import finished
 
 THICKNESS = 0.05
-
-
-def done(work):
-    """Return a generator's value."""
-    try:
-        while True:
-            next(work)
-    except StopIteration as end:
-        return end.value
 
 
 def fresh(shape, vertices, **more):
@@ -149,4 +141,4 @@ def test_a_sheet_whose_cells_make_no_surface_goes_its_own_way():
     )
     energy = energy_of(replace(state, g=1.21 * state.g))
     assert longest(energy(x)[1]) > 0
-    assert done(begun_coarser(energy, x, 0.0, 10)) is x
+    assert finished(begun_coarser(energy, x, 0.0, 10)) is x

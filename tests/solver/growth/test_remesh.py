@@ -12,6 +12,7 @@ from solver.growth.params import GrowthParams
 from solver.growth.remeshing.collapses import collapse
 from solver.growth.remeshing.flips import flip
 from solver.growth.remeshing.remesh import remesh
+from solver.linalg.abreast import finished
 
 MATERIAL = shell.Material(0.05)
 
@@ -119,12 +120,7 @@ def test_remeshing_takes_back_what_cuts_near_an_end_have_left():
     held = np.repeat(np.arange(len(x)) < len(state.x), 3).reshape(-1, 3)
     work = remesh(replace(state, x=x, mesh=top, g=shell.metric(x, top.triangles), rest=rest, held=held), 0.15, 10**6)
     assert 0.125 * state.length < 0.25 * 0.15 < 0.9 * state.length
-    while True:
-        try:
-            next(work)
-        except StopIteration as end:
-            found, _ = end.value
-            break
+    found, _ = finished(work)
     assert np.array_equal(found.x, state.x)
     assert {frozenset(t) for t in found.mesh.triangles.tolist()} == {frozenset(t) for t in mesh.triangles.tolist()}
     assert energy(found, stretched(found.x)) == pytest.approx(energy(state, stretched(state.x)), rel=1e-12)

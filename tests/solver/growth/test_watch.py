@@ -15,18 +15,10 @@ from solver.growth.settling.energy import vertex_areas
 from solver.growth.settling.minimise import longest
 from solver.growth.settling.touching import touches
 from solver.growth.settling.watch import Watch
+from solver.linalg.abreast import finished
 from tests.solver.shell._meshes import sheet
 
 DISTANCE = 0.03
-
-
-def done(work):
-    """Return a generator's value."""
-    try:
-        while True:
-            next(work)
-    except StopIteration as end:
-        return end.value
 
 
 def told_all_over(start, end, distance):
@@ -82,7 +74,7 @@ def test_what_is_remembered_tells_what_looks_all_over_tell(shape, pace, distance
     while told and turn < 8:
         turn, steps = turn + pace, steps + 1
         end = replace(flat, x=shape(flat.x, turn))
-        told = done(watch.apart(before, end))
+        told = finished(watch.apart(before, end))
         assert told == told_all_over(before, end, distance), turn
         before = end.x
     assert not told
@@ -97,9 +89,9 @@ def test_a_long_way_after_short_ones_is_told_from_what_they_found(shape, distanc
     told = []
     for long in np.arange(0.2, 3.0, 0.1):
         watch, begin, first = Watch(distance), replace(flat, x=shape(flat.x, 4.6)), replace(flat, x=shape(flat.x, 4.61))
-        assert done(watch.apart(begin.x, first))
+        assert finished(watch.apart(begin.x, first))
         end = replace(flat, x=shape(flat.x, 4.61 + long))
-        told.append(done(watch.apart(first.x, end)))
+        told.append(finished(watch.apart(first.x, end)))
         assert told[-1] == told_all_over(first.x, end, distance), long
     assert not anew
     assert set(told) == {True, False}
@@ -117,7 +109,7 @@ def test_a_stiff_part_that_sinks_into_another_in_one_step_is_seen():
     down, told = np.repeat([0.0, -0.03], n)[:, None] * np.array([0.0, 0.0, 1.0]), True
     for step in range(8):
         end = replace(state, x=both + (step + 1) * down)
-        told = done(watch.apart(both + step * down, end))
+        told = finished(watch.apart(both + step * down, end))
         assert told == told_all_over(both + step * down, end, distance), step
         if not told:
             break
@@ -132,7 +124,7 @@ def test_a_mesh_that_grows_in_place_is_looked_at_anew():
         watch, state = Watch(DISTANCE), flat
         for turn in np.arange(5.0, 6.0, 0.02):
             end = replace(state, x=rolled(flat.x, turn), g=state.g * factor)
-            told = done(watch.apart(rolled(flat.x, turn - 0.02), end))
+            told = finished(watch.apart(rolled(flat.x, turn - 0.02), end))
             assert told == told_all_over(rolled(flat.x, turn - 0.02), end, DISTANCE)
             state = end
             if not told:
@@ -215,7 +207,7 @@ def test_arms_of_a_flat_sheet_are_seen_to_come_near_each_other(gap, monkeypatch)
     monkeypatch.setattr(module, "touches", lambda s, *a: looked.append(len(s.x)) or touches(s, *a))
     begin = horseshoe(0.08).x
     for start in (begin, state.x):
-        told = done(Watch(DISTANCE).apart(start, state))
+        told = finished(Watch(DISTANCE).apart(start, state))
         assert told == told_all_over(start, state, DISTANCE) == (gap > DISTANCE)
     assert looked
     assert not (gap > DISTANCE and max(looked) == len(state.x)), "no look all over"
@@ -231,5 +223,5 @@ def test_a_wavy_sheet_is_apart_whatever_its_slope(monkeypatch):
         x = state.x.copy()
         x[:, 2] = slope / 12 * np.sin(12 * x[:, 1])
         end = replace(state, x=x, g=shell.metric(x, state.mesh.triangles))
-        assert done(Watch(DISTANCE).apart(state.x, end)) == told_all_over(state.x, end, DISTANCE), slope
+        assert finished(Watch(DISTANCE).apart(state.x, end)) == told_all_over(state.x, end, DISTANCE), slope
     assert set(sure) == {True, False}

@@ -130,7 +130,7 @@ def test_a_heap_of_hundreds_is_done_when_waiting_longer_changes_no_overlap() -> 
     """300 balls on the floor: found before the longest way, and no deeper in each other than ten batches on."""
     pouring = Pouring(BODIES[:1], [0] * 300, np.ones(300), None, 5)
     rest = pouring.rest()
-    assert pouring.batches < 40
+    assert pouring._batch < 40
     for _ in range(10):
         pouring.advance()
     found, after = overlap(rest.centre), overlap(pouring.centre)

@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
-from scipy.optimize import brentq
 from scipy.sparse.linalg import eigsh
 
+from benchmarks.wood.bundles import beam_frequency, beam_sag
 from solver.contract import Need
 from solver.wood import SOLVER
 from solver.wood.forces.hessian import Stiffness
@@ -14,19 +13,13 @@ from solver.wood.model.curves import held
 from solver.wood.model.state import Wood
 from solver.wood.settings import choose
 
-E, G, RHO, RADIUS = 10e9, 0.7e9, 600.0, 0.01
-AREA, SECOND = np.pi * RADIUS**2, np.pi * RADIUS**4 / 4
-#: Shear coefficient of a round section.
-KAPPA = 0.9
+E, RADIUS = 10e9, 0.01
+SECOND = np.pi * RADIUS**4 / 4
 PLAIN = {"fracture": "none", "grain": {"stiffness": 0.0, "strength": 0.0}}
 
 
 def bundle(slender: float, **values):
     return {"radius": RADIUS, "length": slender * RADIUS, "clamp": "start", **PLAIN, **values}
-
-
-def sag(length: float, load: float) -> float:
-    return load * (length**3 / (3 * E * SECOND) + length / (KAPPA * G * AREA))
 
 
 @pytest.mark.parametrize("quality", ["preview", "default"])
@@ -38,22 +31,7 @@ def test_a_bundle_is_as_stiff_as_timoshenko_s_beam(slender, rods, unevenness, qu
     values = bundle(slender, rods=rods, unevenness=unevenness, mode="static", tip_load=(0, 0, -load))
     found = SOLVER.solve(SOLVER.parse(values), Need(stages=(1.0,), quality=quality, fields=("tip_position",)))
     # without load the rods' centroid is on the axis
-    assert -found.tip_position.values[0, 2] == pytest.approx(sag(length, load), rel=0.02)
-
-
-def first_frequency(length: float) -> float:
-    """Return the least w [1/s] at which Timoshenko's equations have a solution, clamped and free."""
-
-    def free(w: float) -> float:
-        # deflection, turning, its slope, shear angle
-        a = np.zeros((4, 4))
-        a[0, 1] = a[0, 3] = a[1, 2] = 1
-        a[2, 1], a[2, 3] = -RHO * w**2 / E, -KAPPA * G * AREA / (E * SECOND)
-        a[3, 0] = -RHO * w**2 / (KAPPA * G)
-        return float(np.linalg.det(expm(a * length)[2:, 2:]))
-
-    slender = 1.8751040687**2 / length**2 * np.sqrt(E * SECOND / (RHO * AREA))
-    return float(brentq(free, 0.7 * slender, 1.02 * slender))
+    assert -found.tip_position.values[0, 2] == pytest.approx(beam_sag(length, load), rel=0.02)
 
 
 @pytest.mark.parametrize(("slender", "rods", "unevenness"), [(10, 40, 0.3), (40, 20, 0.0), (100, 20, 0.3)])
@@ -66,7 +44,7 @@ def test_a_bundle_swings_as_timoshenko_s_beam(slender, rods, unevenness):
     scaled = k.multiply(root[:, None]).multiply(root).tocsc()
     start = np.ones(len(root))
     found = np.sqrt(eigsh(scaled, 2, sigma=0, v0=start, return_eigenvectors=False))
-    assert found.min() == pytest.approx(first_frequency(slender * RADIUS), rel=0.02)
+    assert found.min() == pytest.approx(beam_frequency(slender * RADIUS), rel=0.02)
 
 
 def ends(wood: Wood, x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
