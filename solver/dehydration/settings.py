@@ -137,8 +137,9 @@ _SECONDS_PER_ELEMENT_STEP = 6e-8
 _SETTLING_STEPS = {"preview": 3000, "default": 3000, "fine": 8000}
 #: Steps after which most looked-up shapes are in balance, for estimates only.
 _RELAXING_STEPS = 1500
-#: Seconds until compiled kernels are loaded and the mesh is made.
-_LOADING = 2.0
+#: Seconds until compiled kernels are loaded and the mesh is made, and until the first buckling mode is found where runs
+#: start from it: without and with an elliptic equator, or between mirrors.
+_LOADING, _MODE, _MODE_ANY = 2.0, 5.0, 20.0
 
 
 def choose(params: DehydrationParams, quality: str, last: float = np.inf) -> Settings:
@@ -235,14 +236,17 @@ def expected_cost(params: DehydrationParams, need: Need) -> Cost:
     last = max(need.stages, default=0.0)
     settings = choose(params, need.quality, last)
     if need.start is not None:
-        return _whole_cost(settings, _RELAXING_STEPS)
+        return _whole_cost(params, settings, _RELAXING_STEPS)
     rungs = [rung for rung in settings.rungs if settings.start < rung < last + 1e-9]
     states = len(rungs) + sum(all(abs(stage - rung) > 1e-9 for rung in rungs) for stage in need.stages)
     settling = _SETTLING_STEPS[need.quality] * settings.n / _STEPS_N * states
     steps = max(last - settings.start, 0.0) / settings.pace + settling
-    return _whole_cost(settings, steps)
+    return _whole_cost(params, settings, steps)
 
 
-def _whole_cost(settings: Settings, steps: float) -> Cost:
+def _whole_cost(params: DehydrationParams, settings: Settings, steps: float) -> Cost:
+    started = _LOADING
+    if params.imperfection_kind == "mode" and not (params.is_sphere and not params.mirrors):
+        started += _MODE if params.is_axisymmetric and not params.mirrors else _MODE_ANY
     seconds = steps * settings.elements * _SECONDS_PER_ELEMENT_STEP / (os.cpu_count() or 1)
-    return Cost(_LOADING + seconds, settings.elements * 1200 + 150_000_000)
+    return Cost(started + seconds, settings.elements * 1200 + 150_000_000)

@@ -189,7 +189,7 @@ def query(asked: _Asked) -> None:
         shade = families.shade(known, table.info, stored.families(open_store(asked.store), known))
         metres = known.metres(table.at_parameters(shapes[0].parameters))
         outputs.save(asked.out, replace(made, shade=shade, reach=table.reach, metres=metres))
-    emit(document, asked.as_json, lambda console: _show(console, name, shapes, known.stages.symbol, asked.out))
+    emit(document, asked.as_json, lambda console: _show(console, name, shapes, notes, known.stages.symbol, asked.out))
 
 
 def _parameters(table: ShapeTable, values: Mapping[str, float]) -> dict[str, Any]:
@@ -270,7 +270,9 @@ def _beyond(name: str, table: ShapeTable) -> str:
     return f"Without the {name} of the table's runs, which `wizen table plan {table.info.name}` has:"
 
 
-def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path | None) -> None:
+def _show(
+    console: Any, name: str, shapes: list[Shape], notes: list[Mapping[str, Any]], symbol: str, out: Path | None
+) -> None:
     from solver.rounding import from_zero
     from store.surfaces import measures
 
@@ -288,6 +290,10 @@ def _show(console: Any, name: str, shapes: list[Shape], symbol: str, out: Path |
             + [from_zero(said[key]) for said in errors]
             for key in errors[0]
         ]
+    if any(notes):
+        rows += [["in balance", "", *("yes" if shape.converged else "no" for shape in shapes)]]
+        for key, said in (("residual", "residual"), ("moved", "moved, over the roughness")):
+            rows += [[said, "1", *(f"{told[key]:.2g}" if told else "" for told in notes)]]
     rows += [["a stored run, as it is", "", *("yes" if shape.exact else "no" for shape in shapes)]]
     if any(shape.held is not None and shape.held < _ALL_HELD for shape in shapes):
         told = ("unknown" if shape.held is None else f"{100 * shape.held:.0f}" for shape in shapes)

@@ -57,6 +57,16 @@ def test_what_needs_more_memory_is_refused() -> None:
         budget.within(SOLVER, (FRUIT,), NEED, 1e9, COST.bytes - 1)
 
 
+def test_the_mode_that_a_run_starts_from_takes_its_time() -> None:
+    """A sphere's takes none; fruits with an elliptic equator half a minute."""
+
+    def seconds(preset: str, kind: str) -> float:
+        return SOLVER.cost(SOLVER.parse({"imperfection_kind": kind}, preset), NEED).seconds
+
+    assert seconds("sphere", "mode") == seconds("sphere", "waves")
+    assert seconds("plum2", "mode") > seconds("plum2", "waves") + 10
+
+
 def test_what_is_expected_is_about_what_was_measured() -> None:
     """Runs of the table past the onset; what is loaded once is left out, and cores are not all of use."""
     rows = figures.load("dehydration-buckled")["runs"]

@@ -136,6 +136,34 @@ def test_the_full_road_finds_the_first_of_modes_that_come_almost_at_once(te: flo
     assert [tie.s_cr for tie in found.ties] == sorted(tie.s_cr for tie in found.ties)
 
 
+def test_turns_about_a_held_centre_are_no_onset() -> None:
+    """A fruit without a stone is held in its middle, and has hardly any stiffness against turning about it."""
+    exact, found = (onset(sphere(0.0, 0.2), road=road) for road in (None, "meridional"))  # type: ignore[arg-type]
+    assert found.s_cr == pytest.approx(exact.s_cr, rel=1e-3)
+    assert (found.degree, found.reason) == (exact.degree, "")
+    # whose modes runs start from: it stays as it is, and says so
+    assert "a turn of the whole" in onset(sphere(0.0, 0.2), road="meridional", quality="preview").reason
+
+
+def test_thick_skins_about_elliptic_equators_buckle() -> None:
+    """A pea's equator is nearly round; even waves alone, or a look from past the onset, had it stay smooth to .6."""
+    pea = SOLVER.parse({"te": 0.1}, "pea")
+    assert isinstance(pea, DehydrationParams)
+    rounder = SOLVER.parse({"te": 0.1, "radii": (*pea.radii[:7], pea.radii[3])}, "pea")
+    assert isinstance(rounder, DehydrationParams)
+    found = full.crossings(pea, quality="preview")[1]
+    assert found[0].shrinkage == pytest.approx(onset(rounder).s_cr, rel=0.01)
+
+
+@pytest.mark.slow
+def test_a_finer_mesh_that_is_past_the_onset_looks_from_before_it() -> None:
+    """Of plum 2 under a skin of .06, between those of .05 (.0850) and .08 (.1078)."""
+    plum = SOLVER.parse({"te": 0.06}, "plum2")
+    assert isinstance(plum, DehydrationParams)
+    found = full.crossings(plum, quality="preview")[1]
+    assert found[0].shrinkage == pytest.approx(0.091, rel=0.01)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("preset", ["jujube2", "raisin"])
 def test_the_full_road_agrees_with_the_meridional_one_under_oblique_skins(preset: str) -> None:

@@ -2,23 +2,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
-
-from service.cli import app
+from _command import document, wizen
 
 REFERENCE = Path(__file__).parents[1] / "solver" / "core_shell_sphere.json"
-
-
-def wizen(*words: object) -> Result:
-    return CliRunner().invoke(app, [str(word) for word in words])
-
-
-def document(result: Result) -> Any:
-    return json.loads(result.stdout)
 
 
 def test_help_teaches_by_example() -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import shlex
 import shutil
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -210,6 +212,19 @@ def test_what_falls_apart_when_relaxed_says_what_to_type(monkeypatch: pytest.Mon
     raisin = SOLVER.parse({}, "raisin")
     assert said.pop("mirrors") == "xz"  # as the table's runs are done
     assert SOLVER.parse({name: float(value) for name, value in said.items()}).axis("r4") == raisin.axis("r4")
+
+
+def test_whether_what_was_relaxed_is_in_balance_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def tired(*asked: Any, **_: object) -> tuple[Any, dict[str, float]]:
+        told = {"residual": 0.02, "moved": 0.3, "iterations": 4000.0, "seconds": 9.0}
+        return dataclasses.replace(asked[2], converged=False), told
+
+    monkeypatch.setattr("sweeps.relaxing.relaxed", tired)
+    found = wizen("query", "--preset", "raisin", "--stages", "0.1", "--resolution", 16, "--relax")
+    words = " ".join(found.stdout.split())
+    assert "in balance no" in words
+    assert "residual 1 0.02" in words
+    assert "in balance" not in wizen("query", "--preset", "raisin", "--stages", "0.1", "--resolution", 16).stdout
 
 
 def test_query_by_a_method_within_an_error(table: Path) -> None:

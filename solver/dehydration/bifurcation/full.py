@@ -50,8 +50,8 @@ PENALTY = 1e5
 #: Largest shrinkage that is looked at.
 SEARCHED = 0.6
 #: Share of the expected onset at which one looks first, from a look that saw it, and on the finer mesh (whose onset is
-#: lower).
-FIRST_LOOK, NEXT_LOOK, FINE_LOOK = 0.85, 0.97, 0.975
+#: lower); and where the look that is nearest saw none.
+FIRST_LOOK, NEXT_LOOK, FINE_LOOK, EARLY_LOOK = 0.85, 0.97, 0.975, 0.7
 #: A look that found the smooth state unstable, or not at all, is taken again from this much of it.
 BACK = 0.96
 #: A look from farther below the onset than this is repeated from nearer.
@@ -169,11 +169,14 @@ class _Search:
     def run(self, coarse: float, fine: float) -> tuple[Model, list[Crossing]]:
         """Return the finer mesh's model and the crossings, sorted; coarse, fine: elements per wrinkle."""
         look = self._place(coarse)
-        first = look.first
-        if first.shrinkage > SEARCHED:
+        parity = look.first.parity
+        if look.first.shrinkage <= SEARCHED:
+            look = self._all(look)
+        if look.first.shrinkage > SEARCHED:
+            look = self._early(look)
+        if look.first.shrinkage > SEARCHED:
             return look.model, []
-        look = self._all(look)
-        first = next(each for each in look.found if each.parity == first.parity)
+        first = next((each for each in look.found if each.parity == parity), look.first)
         # where it does not matter, the parity whose factor is at hand
         best = first if first.shrinkage < (1 + SAME) * look.first.shrinkage else look.first
         n = max(self._elements(look.patch, fine, 1), len(look.model.mesh.quad_of[0]) + 2)
@@ -219,6 +222,16 @@ class _Search:
             else:
                 return replace(look, found=sorted([*look.found, *found], key=lambda each: each.shrinkage))
         raise self._lost()
+
+    def _early(self, look: Look) -> Look:
+        """Return what all parities show from well before the expected onset.
+
+        Thick skins have few waves, and those of even parity grow on the smooth state itself, which then goes by the
+        onset with no even tangent turning singular.
+        """
+        self.below, self.unstable = EARLY_LOOK * float(self.places.onsets.min()), np.inf
+        self.states.forget()
+        return self._repeated(look.model, {parity: None for parity, _ in parities(look.model)}, 0.3, look.patch)
 
     # ------------------------------------------------------------------------------------------------------ where
 
@@ -294,6 +307,10 @@ class _Search:
             except (NotConverged, _AlreadyUnstable):
                 if self.method == "linear":
                     raise
+                self._back(self.below)
+                continue
+            if not found and coarser is not None and self.method == "exact":
+                # the coarser mesh saw one: on this one the smooth state is past it
                 self._back(self.below)
                 continue
             near = found[0].shrinkage if found else np.inf

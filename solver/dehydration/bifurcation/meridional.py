@@ -57,7 +57,9 @@ def onset_meridional(
     wave = 2 * math.pi / min(flat_film_wavelength(params.exocarp_thickness, params.modulus_ratio), 1.0)
     widest = float(params.generatrix(np.linspace(0, np.pi, 181))[0].max())
     highest = math.ceil(1.3 * wave * widest) + 4
-    scan = Perturbations(Meridian(params, min(_SCAN, fine), kappa_ratio))
+    # runs start from modes of quality preview: whose bytes change, that is another version of the solver
+    turns = quality == "preview"
+    scan = Perturbations(Meridian(params, min(_SCAN, fine), kappa_ratio), turns)
     coarse = sorted({0, 1, 2, 3, *np.linspace(3, highest, 10).round().astype(int).tolist()})
     rough = _rough(scan, coarse, method, onset_estimate(params.modulus_ratio, min(params.stone)), context)
     settings: dict[str, Any] = {"per_wavelength": fine, "kappa_ratio_used": scan.meridian.bulk}
@@ -66,7 +68,7 @@ def onset_meridional(
     if least > SEARCHED:
         seconds = time.perf_counter() - begin
         return Onset(None, None, None, mode=None, seconds=seconds, reason=stable_reason(SEARCHED), **common)
-    space = Perturbations(Meridian(params, fine, kappa_ratio))
+    space = Perturbations(Meridian(params, fine, kappa_ratio), turns)
     valleys = [m for i, m in enumerate(coarse) if rough[m] <= min(rough[n] for n in coarse[max(i - 1, 0) : i + 2])]
     starts = sorted((m for m in valleys if rough[m] < (1 + _CLOSE) * least), key=rough.__getitem__)[:3]
     modes = _decide(space, starts, (coarse[-1] - coarse[-2]) // 2, least, highest, method, context)
@@ -81,7 +83,8 @@ def onset_meridional(
     settings |= {"columns": len(mesh.colatitude), "elements": len(mesh.nodes), "unknowns": space.size}
     first = near[0][1]
     short = f"m = {first} is the largest wavenumber that was looked at: shorter waves may come first"
-    reason = short if first >= highest else ""
+    turned = "this is a turn of the whole about its centre and no buckling: quality default finds the onset"
+    reason = short if first >= highest else "" if near[0][2].vanishes or first > 1 else turned
     seconds = time.perf_counter() - begin
     common |= {"ties": ties, "seconds": seconds, "settings": settings, "reason": reason}
     return Onset(s_cr, degrees[0], first, mode=shapes[0], **common)

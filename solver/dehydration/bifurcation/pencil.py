@@ -26,10 +26,15 @@ class UnstableStart(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Critical:
-    """A mode: where it starts, and the height of its buckles (columns,) along the outward normal, largest one 1."""
+    """A mode: where it starts, and the height of its buckles (columns,) along the outward normal, largest one 1.
+
+    vanishes: whether its own energy does so there; a turn of the whole fruit about a small held centre has hardly any
+    and keeps it, so that what is left of rounding may look like a start.
+    """
 
     s: float
     profile: Floats
+    vanishes: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,10 +50,12 @@ class Perturbations:
 
     With the pressures kept the tangent varies slowly with s even where volumes hardly change, so that it can be
     interpolated; without them it is positive definite while the state is stable, so that it can be factored.
+
+    turns: whether turns of the whole fruit are taken for modes where they look like some.
     """
 
-    def __init__(self, meridian: Meridian) -> None:
-        self.meridian = meridian
+    def __init__(self, meridian: Meridian, turns: bool = False) -> None:
+        self.meridian, self.turns = meridian, turns
         mesh = meridian.mesh
         free = np.ones((len(mesh.position), 3), dtype=bool)
         free[:: mesh.levels] = False
@@ -195,23 +202,28 @@ class Pencil:
             values, vectors = error.eigenvalues, error.eigenvectors  # type: ignore[assignment]
             if not len(values):
                 raise NotConverged(f"the modes of wavenumber {m} were not found.", advice="Try quality fine.") from None
-        modes = [
-            Critical(self._root(vector.real, matrices, self.at[0] + 1 / value.real), space.profile(vector.real))
+        found = [
+            (vector.real, *self._root(vector.real, matrices, self.at[0] + 1 / value.real))
             for value, vector in zip(values, vectors.T, strict=True)
             if value.real > 1e-3 and abs(value.imag) < 1e-6 * value.real
+        ]
+        modes = [
+            Critical(s, space.profile(vector), vanishes)
+            for vector, s, vanishes in found
+            if vanishes or m > 1 or space.turns
         ]
         none = [Critical(np.inf, np.zeros(len(space.meridian.mesh.colatitude)))]
         return sorted(modes, key=lambda mode: mode.s) or none
 
-    def _root(self, vector: Floats, matrices: Sequence[sparse.csr_array], near: float) -> float:
-        """Return where the mode's own energy vanishes: its error is the square of the mode's."""
+    def _root(self, vector: Floats, matrices: Sequence[sparse.csr_array], near: float) -> tuple[float, bool]:
+        """Return where the mode's own energy vanishes, off by the mode's square; `near` and False where it does not."""
         if len(matrices) == 2:
-            return near
+            return near, True
         energies = [float(vector @ (matrix @ vector)) for matrix in matrices]
         roots = np.roots(np.polyfit(np.array(self.at) - self.at[1], energies, len(self.at) - 1)) + self.at[1]
         real = roots[np.isreal(roots)].real
         real = real[real > self.at[0]]
-        return float(real[np.argmin(np.abs(real - near))]) if len(real) else near
+        return (float(real[np.argmin(np.abs(real - near))]), True) if len(real) else (near, False)
 
 
 def _at(terms: Terms, m: int) -> Floats:

@@ -20,16 +20,19 @@ _WATER, _SOLIDS = 997.0, 1591.3
 
 
 class _Measured(NamedTuple):
-    """A law of moisture, and the share of water in the fresh flesh (None: to be said)."""
+    """A law of moisture, the share of water in the fresh flesh (None: to be said), and conditions that do not enter."""
 
     left: Callable[[float, Drying], float]
     water: float | None
+    without: tuple[str, ...]
 
+
+_OWN, _AIR = ("rate", "exponent"), ("temperature", "humidity", "air_speed", "diameter")
 
 _KINETICS: Mapping[str, _Measured] = {
-    "grape": _Measured(moisture.grape, 0.782),  # Doymaz 2012
-    "jujube": _Measured(moisture.jujube, 0.7786),  # USDA FoodData Central, jujube, raw
-    "page": _Measured(moisture.page, None),
+    "grape": _Measured(moisture.grape, 0.782, _OWN),  # Doymaz 2012
+    "jujube": _Measured(moisture.jujube, 0.7786, _OWN),  # USDA FoodData Central, jujube, raw
+    "page": _Measured(moisture.page, None, _AIR),
 }
 
 #: Presets whose fruit was measured.
@@ -55,6 +58,7 @@ def _stage(hours: float, under: Drying, preset: str | None) -> float:
             f"your own; presets with kinetics of their own: {', '.join(_FRUITS)}.",
         )
     law = _KINETICS[name]
+    _heeds(name, law, under)
     water = law.water if under.moisture is None else under.moisture
     if water is None:
         raise InvalidInput(
@@ -67,6 +71,19 @@ def _stage(hours: float, under: Drying, preset: str | None) -> float:
             advice=f"Ask for at most {towards_zero(_longest(law, hours, under, water), 4)} hours.",
         )
     return stage
+
+
+def _heeds(name: str, law: _Measured, under: Drying) -> None:
+    """Refuse conditions that would change nothing."""
+    idle = [each for each in law.without if each in under.model_fields_set and getattr(under, each) is not None]
+    if idle:
+        instead = ", or set kinetics=page with rate, exponent and moisture of your own"
+        if law.water is None:
+            instead = ": what your own measurements had is in their rate and exponent"
+        raise InvalidInput(
+            f"{', '.join(idle)} would change nothing: the law of kinetics={name} does not hold it.",
+            advice=f"Leave {' and '.join(idle)} out{instead}.",
+        )
 
 
 def _after(law: _Measured, hours: float, under: Drying, water: float) -> float:

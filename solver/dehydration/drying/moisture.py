@@ -49,7 +49,7 @@ def grape(hours: float, under: Drying) -> float:
         if getattr(under, name) is not None:
             raise InvalidInput(
                 f"{name} is set, but these grapes dried in the open sun.",
-                advice=f"Leave {name} out, or set kinetics=page with rate and exponent of your own measurements.",
+                advice=f"Leave {name} out, or set kinetics=page with rate, exponent and moisture of your own.",
             )
     diameter = _SEEDLESS[0] if under.diameter is None else under.diameter
     _within("diameter", diameter, _SEEDLESS[0], _SEEDED[0], "mm")
@@ -133,5 +133,5 @@ def _within(name: str, value: float, low: float, high: float, units: str) -> Non
         raise InvalidInput(
             f"{name} = {value:.15g} {units} is outside of what was measured: "
             f"{low:g} to {towards_zero(high, 4)} {units}.",
-            advice=f"Take {name} from there, or set kinetics=page with rate and exponent of your own measurements.",
+            advice=f"Take {name} from there, or set kinetics=page with rate, exponent and moisture of your own.",
         )

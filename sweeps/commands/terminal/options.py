@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ...errors import InvalidOption
+from .console import note
 
 if TYPE_CHECKING:
     from solver.contract import Solver
@@ -229,9 +230,13 @@ def stages_asked(
         raise InvalidOption("--hours and --stages exclude each other.", "Keep one of them.")
     asked, conditions = numbers(hours, "--hours"), assignments(under, "--under")
     try:
-        return solver.stages_after(asked, conditions, preset)
+        found = solver.stages_after(asked, conditions, preset)
     except InvalidInput as error:
         raise InvalidInput(error.message, advice=solver.conditions_as(error.advice, _under)) from None
+    # stages come in their own order, and those that are the same once
+    said = ", ".join(f"{stage:g} after {hour:g} h" for hour, stage in zip(asked, found, strict=True))
+    note(f"{solver.stages.symbol} = {said}")
+    return found
 
 
 def _under(conditions: Mapping[str, str]) -> str:
