@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -71,11 +71,10 @@ def build(
     read, text = _plan(opened, plan)
     if read is not None:
         plan, solver = read.name, solver or read.solver.name
-    # what the file says now: what was swept under its name before may have been more
-    keys = tuple(job.key for job in read.jobs() if opened.has(job.key)) if read is not None else ()
+    keys = _runs_of(opened, read) if read is not None else None
     chosen = registry.get(solver or _only_solver(opened, plan))
     made = None
-    choice = Choice(plan, quality, version, keys or None)
+    choice = Choice(plan, quality, version, keys)
     if chosen.surface is not None and finished(opened, chosen.name, choice, is_surface):
         told: dict[str, Any] = {"resolution": resolution, "text": text, "dtype": precision}
         made = tables.build(opened, chosen, name, **choice._asdict(), **told)
@@ -253,6 +252,42 @@ def _plan(store: Store, plan: str | None) -> tuple[Plan | None, str]:
     from ..planning.plan import Plan
 
     return Plan.read(plan)
+
+
+def _runs_of(store: Store, plan: Plan) -> tuple[str, ...]:
+    """Return the stored runs of a plan as its file is now: what was swept under its name before may have been more.
+
+    Where there is none of the solver's version, those of others are taken, and what their parameters start from is of
+    these, too.
+
+    Raises:
+        EmptyTable: no such run is stored.
+
+    """
+    from store.errors import EmptyTable
+
+    asked = list(plan.jobs())
+    if keys := tuple(job.key for job in asked if store.has(job.key)):
+        return keys
+    wanted = {_without_keys(job.params) for job in asked}
+    done = [job for job in store.ledger.jobs("done", plan.name) if _without_keys(job.params) in wanted]
+    if keys := tuple(job.key for job in done if store.has(job.key)):
+        return keys
+    raise EmptyTable(
+        f"no run of plan {plan.name!r} as its file is now is stored.",
+        "Sweep it first; --plan with its name alone takes what was swept under that before.",
+    )
+
+
+def _without_keys(params: Mapping[str, Any]) -> bytes:
+    """Return parameters without the runs that they start from."""
+    from store.canonical import canonical
+
+    told = {
+        name: {part: each for part, each in value.items() if part != "key"} if isinstance(value, Mapping) else value
+        for name, value in params.items()
+    }
+    return canonical(told)
 
 
 def _show_table(table: Any, path: Path, as_json: bool, numbers: dict[str, Any] | None) -> None:

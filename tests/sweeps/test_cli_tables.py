@@ -239,6 +239,25 @@ def test_query_by_a_method_within_an_error(table: Path) -> None:
     assert "does not say how far" in refused.stderr
 
 
+def test_a_table_of_a_plan_s_file_holds_what_the_file_says_now(site: None, tmp_path: Path) -> None:
+    from sweeps.commands.tables import _runs_of
+    from sweeps.planning.plan import Plan
+
+    store, file = tmp_path / "store", tmp_path / "two.toml"
+    assert wizen("sweep", write(file, te="[0.02, 0.03]", gamma="[10]"), "--store", store).exit_code == 0
+    build = ("table", "build", "--store", store, "--plan")
+    assert document(wizen(*build, file, "--json"))["samples"] == 2
+    write(file, te="[0.03]", gamma="[10]")
+    assert document(wizen(*build, file, "--json"))["samples"] == 1
+    plan, _ = Plan.read(file)
+    other = dataclasses.replace(plan, solver=dataclasses.replace(plan.solver, version="another"))
+    assert {job.key for job in plan.jobs()} == set(_runs_of(Store.open(store), other))  # by version as it is there
+    refused = wizen(*build, write(file, te="[0.04]", gamma="[10]"))
+    assert refused.exit_code != 0
+    assert "no run of plan 'two' as its file is now is stored" in " ".join(refused.stderr.split())
+    assert document(wizen(*build, "two", "--json"))["samples"] == 2
+
+
 def test_query_swollen(site: None, tmp_path: Path) -> None:
     store, out = tmp_path / "store", tmp_path / "shape.npz"
     plan = write(tmp_path / "swollen.toml", gamma="[10]", stages="[-0.2, -0.1]")
