@@ -100,7 +100,9 @@ register(
     mean_radius=Quantity("1", "mean distance from the centre, weighted by the fresh area, in units of r1", "r_mean"),
     roughness=Quantity("1", "rms of the radial wrinkle amplitude (degrees l >= 3), in units of r1", "A_rms"),
     dominant_degree=Quantity("1", "power-weighted mean spherical-harmonic degree of the wrinkles (l >= 3)", "l"),
-    wavelength=Quantity("1", "wavelength of the dominant degree on a sphere of the mean radius, in units of r1", "lambda"),
+    wavelength=Quantity(
+        "1", "wavelength of the dominant degree on a sphere of the mean radius, in units of r1", "lambda"
+    ),
     buckle_count=Quantity("1", "number of separate inward buckles", "N"),
     ridge_anisotropy=Quantity(
         "1", "anisotropy of the wrinkle slope: +1 ridges along meridians, 0 reticular, -1 rings", "a"
