@@ -93,7 +93,7 @@ def hand_over(quality: Quality, shrinkage: float) -> list[Row]:
         data = times[0][0]
         return data, float(np.median([seconds for _, seconds in times])), data.nbytes / 1e6
 
-    shape: dict[str, Any] = {"fields": ("displacement",), "apart": False}
+    shape: dict[str, Any] = {"fields": ("displacement",)}
     scalars = {"fields": ("roughness", "dominant_degree", "wavelength")}
     full, full_cpu, full_size = give({})
     whole = {"instead_of": "all default fields", "cpu_full": full_cpu, "MB_full": full_size}
@@ -146,8 +146,6 @@ def handed(quality: Quality, shrinkage: float) -> Row:
 
 def measure(record: Record, quality: Quality = "preview") -> None:
     """Run every row anew; the quality's row comes from the runs after buckling, if they are in the record."""
-    from solver.dehydration import SOLVER
-
     whole_runs = {
         "stop at s = 0.15": ("run to s = 0.3", "skips:early_stop", {"last": 0.3, "wanted": 0.15}),
         "closed form at s = 0.05": ("march from s = 0", "skips:below_onset", {"shrinkage": 0.05}),
@@ -158,7 +156,9 @@ def measure(record: Record, quality: Quality = "preview") -> None:
         rows.append(row | worker(function, quality=quality, **arguments))
     handed_over = worker("skips:handed", quality=quality, shrinkage=0.15)
     rows += handed_over.get("rows", [{"what": "hand-over", **handed_over}])
-    rows += _qualities(summary(record.rows("buckled"), SOLVER.version))
+    buckled = record.rows("buckled")
+    # of the newest version that they were run by, which need not be the solver's
+    rows += _qualities(summary(buckled, max((row["version"] for row in buckled), key=int, default="")))
     record.parts["skips"] = rows
     record.save("skips")
     for row in rows:
