@@ -131,6 +131,24 @@ def test_runs_of_tables_keep_their_roughness_as_is_said() -> None:
     assert 100 * max(off["plum1"]) < float(said[2]) + 0.05
 
 
+def test_errors_of_runs_held_out_are_covered_as_is_said() -> None:
+    held = [run for run in figures.load("dehydration-calibration")["runs"] if run["of"] == "runs held out"]
+    ratios = {run["family"]: np.array(run["ratios"]) for run in held}
+    share = {name: np.rint(100 * (each <= 1).mean(axis=0)).astype(int) for name, each in ratios.items()}
+    both = np.rint(100 * (np.concatenate(list(ratios.values())) <= 1).mean(axis=0)).astype(int)
+    own, measures = share["plum2"], figures.load("dehydration-calibration")["measures"]
+    of = dict(zip(measures, own.tolist(), strict=True))
+    rest = [of[name] for name in measures if name not in ("rgh", "L2nr", "ang")]
+    page = " ".join(_page("docs/maps.md").split())
+    assert f"It covers {share['default'].min()} to {share['default'].max()} % of the default family's" in page
+    assert of["rgh"] == of["L2nr"]
+    assert f"it covers {of['rgh']} % in roughness and in the surfaces' distance, {of['ang']} % in normals" in page
+    assert f"and {min(rest)} to {max(rest)} % in the rest" in page
+    others = both[[name != "rgh" for name in measures]]
+    rough = both[measures.index("rgh")]
+    assert f"Of all 72 it covers {rough} % in roughness and {others.min()} to {others.max()} % in the rest" in page
+
+
 def test_slow_frames_of_painting_are_as_slow_as_is_said() -> None:
     rows = figures.load("growth-painting")["table"]["rows"]
     page = _page("docs/growth.md")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -127,7 +128,8 @@ def _asked(item: Item, runs: Runs, stages: Sequence[float]) -> str | Missing:
     for job in _alike(store, asked.spec):
         if store.has(job.key) and _fits(job, asked.need, item.quality):
             return job.key
-    asked = _question(item, stages)
+    with suppress(SolverError):  # a stage of another item's that there cannot be: that one is told
+        asked = _question(item, stages)
     spec = asked.spec
     known = _job(store, spec.key)
     if known is not None:

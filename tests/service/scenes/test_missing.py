@@ -109,6 +109,15 @@ def test_one_job_has_all_stages_at_which_a_scene_shows_a_run(store: Store, queue
     assert len(queue_only.get("/v1/jobs").json()["jobs"]) == 2
 
 
+@pytest.mark.usefixtures("shrinking")
+def test_a_stage_that_cannot_be_is_told_of_its_own_item_alone(queue_only: httpx.Client) -> None:
+    items = [{**ITEM, "stage": 0.22}, {**ITEM, "stage": 9.0, "transforms": [{"position": [3, 0, 0]}]}]
+    answer = queue_only.post("/v1/scenes", json={"camera": CAMERA, "items": items})
+    said = checked(answer, 422, "invalid-scene")
+    assert "items.1" in said["detail"]
+    assert "items.0" not in said["detail"]
+
+
 def test_places_hold_boxes_of_the_right_size(tmp_path: Path) -> None:
     root = Store.open(tmp_path / "store", create=True).root
     scene = {
