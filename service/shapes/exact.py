@@ -16,7 +16,7 @@ from starlette.responses import Response
 
 from solver.contract import InvalidInput, Need, Params, SolverError, Start
 from store.errors import OutsideTable, TooUncertain
-from store.families.stored import document, refusal
+from store.families.stored import called, document, refusal
 from store.starter import is_starter
 from store.surfaces.window import WHOLE
 from sweeps.relaxing import lattice_of
@@ -61,7 +61,8 @@ def offered(request: Request, asked: Asked, error: OutsideRanges | TooUncertain)
             whole = refusal(asked.found.fits)
             message, advice = whole.message, f"{whole.advice} {offer}"
         else:
-            advice = f"The nearest table is {near.info.name!r}, {near.distance:.3g} away. {advice}"
+            which = called(asked.found.fits).capitalize()
+            advice = f"{which} table is {near.info.name!r}, {near.distance:.3g} away. {advice}"
     if isinstance(error, OutsideRanges):
         return OutsideRanges(message, advice=advice, wrong=error.wrong, more=more)
     return Uncertain(error.message, advice=advice, more=more)

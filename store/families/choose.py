@@ -99,11 +99,15 @@ class Families:
         return {**self._fills(info), **(self._presets[preset] if preset is not None else {})}
 
     def nearest(self, said: Mapping[str, Any], stage: float | None, preset: str | None = None) -> list[Fit]:
-        """Return all families with what each misses, the nearest first: for a question that none of them holds."""
+        """Return all families with what each misses, the nearest first: for a question that none of them holds.
+
+        Who names a preset wants that fruit: families that hold all of it but what was said over it come before others.
+        """
         values = self.values(said, preset) | ({STAGE: stage} if stage is not None else {})
         named = flat(said, self._axes).keys()
         fits = (self.fit(info, values, named) for info in self.infos)
-        return sorted(fits, key=lambda fit: (fit.distance, fit.info.name))
+        over = {*named, STAGE} if preset is not None else set()
+        return sorted(fits, key=lambda fit: (not _misses_only(fit, over), fit.distance, fit.info.name))
 
     def fit(self, info: TableInfo, values: Mapping[str, Any], named: Collection[str] = ()) -> Fit:
         """Return how a table fits all that is said; what is incidental counts where it is `named`."""
@@ -154,6 +158,10 @@ class Families:
             samples = self._places(info)
             self._spacings[info.name] = 0.0 if samples is None else _spacing(samples)
         return self._spacings[info.name]
+
+
+def _misses_only(fit: Fit, names: Collection[str]) -> bool:
+    return all(miss.name in names for miss in (*fit.misses, *fit.unusual))
 
 
 def _spacing(samples: Array) -> float:

@@ -19,7 +19,18 @@ from ..store import Store
 from .choose import Base, Families
 from .match import STAGE, Fit, Miss, same
 
-__all__ = ["base", "check_version", "describe", "document", "families", "made", "refusal", "samples", "values"]
+__all__ = [
+    "base",
+    "called",
+    "check_version",
+    "describe",
+    "document",
+    "families",
+    "made",
+    "refusal",
+    "samples",
+    "values",
+]
 
 
 def base(solver: Solver) -> Base:
@@ -137,7 +148,7 @@ def _changes(misses: Sequence[Miss], info: TableInfo) -> str:
 
 
 def refusal(fits: Sequence[Fit]) -> OutsideTable:
-    """Return the refusal of a question that no family holds; `fits` has the nearest first."""
+    """Return the refusal of a question that no family holds; `fits` are as `Families.nearest` orders them."""
     near = fits[0]
     said = [
         f"{miss.name} = {_said(miss.asked, 9)} (holds {_span(miss.reach) if miss.reach else _said(miss.held)})"
@@ -146,10 +157,15 @@ def refusal(fits: Sequence[Fit]) -> OutsideTable:
     more = f" and {len(said) - 4} more" if len(said) > 4 else ""
     others = ", ".join(f"{fit.info.name} {fit.distance:.3g}" for fit in fits[1:4])
     return OutsideTable(
-        f"no table holds this; the nearest is {near.info.name!r}, {near.distance:.3g} away in "
+        f"no table holds this; {called(fits)} is {near.info.name!r}, {near.distance:.3g} away in "
         f"{', '.join(said[:4])}{more}.",
-        _instead(near) + (f" The next: {others}." if others else ""),
+        _instead(near) + (f" Others: {others}." if others else ""),
     )
+
+
+def called(fits: Sequence[Fit]) -> str:
+    """Return what the first of `Families.nearest` is called: of a preset's fruit, another one may be nearer."""
+    return "the nearest" if fits[0].distance <= min(fit.distance for fit in fits) else "the preset's own"
 
 
 def document(fit: Fit) -> dict[str, Any]:

@@ -57,7 +57,9 @@ def test_numbers_that_no_quotient_holds_are_a_finite_distance_apart(families: Fa
     # gamma: 5e-324 / 5 is 0, and 1e308 / 0.02 for te infinite
     for name, others in (("gamma", {"te": 0.01}), ("te", {"gamma": 10.0})):
         fits = families.nearest({name: number, **others}, 0.2, "raisin")
-        distances = [fit.distance for fit in fits]
+        # the fruit that is named comes first
+        assert fits[0].info.name == "raisin"
+        distances = [fit.distance for fit in fits[1:]]
         assert distances == sorted(distances)
         for fit in fits:
             (miss,) = (miss for miss in fit.misses if miss.name == name)
@@ -201,6 +203,18 @@ def test_the_nearest_table_and_how_far(families: Families) -> None:
     assert "'raisin', 0.405 away in te = 0.03 (holds 0.005 to 0.02)" in str(refusal)
     assert families.presets_of(families.infos[0]) == ["raisin"]
     assert families.presets_of(families.infos[1]) == ["sphere"]
+
+
+def test_who_names_a_preset_is_told_of_its_own_table_first(families: Families) -> None:
+    fits = families.nearest({"te": 10.0}, 0.9, "raisin")
+    assert [fit.info.name for fit in fits] == ["raisin", "sphere", "thin"]
+    assert fits[1].distance < fits[0].distance
+    refusal = stored.refusal(fits)
+    assert "the preset's own is 'raisin', 6.31 away in te = 10 (holds 0.005 to 0.02)" in str(refusal)
+    assert refusal.advice.startswith("The nearest fruit that it holds: Set te=0.02. Ask for the stage 0.3.")
+    # without a preset there is nothing but the distance
+    bare = families.nearest({"te": 10.0, **families.values({}, "raisin"), "gamma": 10.0}, 0.2)
+    assert [fit.distance for fit in bare] == sorted(fit.distance for fit in bare)
 
 
 def ellipse(r4: float) -> float:
