@@ -117,10 +117,10 @@ def write(
     ):
         if dtype == "int16":
             whole = [block.astype(np.float32) for block in blocks()]
-            codes = _encoded(whole)
+            codes, lost = _encoded(whole)
             file.dimensions = dict(zip(PACKED, codes.codes.shape, strict=True))
             target = _spectrum(file, PACKED, dtype)
-            _state_loss(target, np.add(packed.loss(whole, codes), source.lost))
+            _state_loss(target, np.add(lost, source.lost))
             more, stored = _packing(codes), packed.Packed(codes)
             written: Iterable[Array] = codes.codes
         else:
@@ -142,12 +142,15 @@ def write(
     return Written(content, tuple(name for name in rows[0] if name in small and name not in CONVERGENCE))
 
 
-def _encoded(whole: list[Array]) -> packed.Codes:
-    """Pack spectra; of those that are all zero one wave is kept, for what has no bytes cannot be mapped."""
-    codes = packed.encode(whole)
+def _encoded(whole: list[Array]) -> tuple[packed.Codes, tuple[float, float]]:
+    """Pack spectra, and say what they lose.
+
+    Of those that are all zero one wave is kept, for what has no bytes cannot be mapped.
+    """
+    codes, lost = packed.within(whole)
     if codes.place.size:
-        return codes
-    return codes._replace(codes=np.zeros((*codes.codes.shape[:2], 1), np.int16), place=np.zeros(1, np.int32))
+        return codes, lost
+    return codes._replace(codes=np.zeros((*codes.codes.shape[:2], 1), np.int16), place=np.zeros(1, np.int32)), lost
 
 
 def _append(path: Path, small: xr.Dataset) -> None:

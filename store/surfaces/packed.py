@@ -18,10 +18,12 @@ from solver.arrays import Array
 from ..kept import Kept, Part
 from . import harmonics, spectra
 
-__all__ = ["FINEST", "Codes", "Packed", "Stored", "encode", "loss"]
+__all__ = ["FINEST", "MOST", "Codes", "Packed", "Stored", "encode", "loss", "within"]
 
 #: Least step [r1]: waves of less than half of it are nothing. At degree 128 it costs some 1e-5 r1 of the surface.
 FINEST = 2e-7
+#: Most that a point of a surface may lose [r1]: small waves that meet in one point can lose more, and get finer steps.
+MOST = 1e-4
 _LARGEST = 32767
 #: Bytes of unpacked blocks that all tables keep.
 _ROOM = 64 << 20
@@ -37,14 +39,28 @@ class Codes(NamedTuple):
     step: Array
 
 
-def encode(blocks: Sequence[Array]) -> Codes:
-    """Pack the spectra (stage, component, m, k, part) of all samples."""
+def within(blocks: Sequence[Array]) -> tuple[Codes, tuple[float, float]]:
+    """Pack spectra so that no point loses more than `MOST`, where 16 bits can; and return what they lose (`loss`)."""
+    finest = FINEST
+    codes = encode(blocks, finest)
+    lost = loss(blocks, codes)
+    while lost[1] > MOST:
+        finest, before = finest / 2, codes
+        codes = encode(blocks, finest)
+        if (codes.step == before.step).all():
+            break
+        lost = loss(blocks, codes)
+    return codes, lost
+
+
+def encode(blocks: Sequence[Array], finest: float = FINEST) -> Codes:
+    """Pack the spectra (stage, component, m, k, part) of all samples, in steps of at least `finest` [r1]."""
     waves = blocks[0].shape[-2]
     most = np.max([np.abs(block).max(axis=(0, 1, 4)) for block in blocks], axis=0)
     shells = _shells(waves)
     largest = np.zeros(waves)
     np.maximum.at(largest, shells.ravel(), most.ravel())
-    step = np.maximum(largest / _LARGEST, FINEST).astype(np.float32)
+    step = np.maximum(largest / _LARGEST, finest).astype(np.float32)
     by_wave = step[shells][:, :, None]
     whole = [np.rint(block / by_wave).astype(np.int16) for block in blocks]
     place = np.flatnonzero(np.any([np.any(block, axis=0) for block in whole], axis=0).ravel()).astype(np.int32)

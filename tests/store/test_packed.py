@@ -59,6 +59,23 @@ def test_what_is_lost_is_what_is_said_and_less_than_a_ten_thousandth() -> None:
     assert np.abs(codes.codes).max() == 32767
 
 
+def test_small_waves_that_meet_in_one_point_get_finer_steps() -> None:
+    whole = blocks(n=48)
+    # each less than half a step, and all of them in phase near a pole
+    whole[1][1, 0, 0, 1:, 0] += 0.45 * packed.FINEST
+    whole[1][1, 0, 2::2, :, 0] += 0.45 * packed.FINEST
+    assert packed.loss(whole, packed.encode(whole))[1] > packed.MOST
+    codes, lost = packed.within(whole)
+    assert lost == packed.loss(whole, codes)
+    assert lost[1] <= packed.MOST
+    assert codes.step.min() < packed.FINEST
+    # what loses little is packed as ever, and what 16 bits cannot hold is given up
+    codes, _ = packed.within(blocks())
+    assert (codes.codes == packed.encode(blocks()).codes).all()
+    large = [1e4 * block for block in blocks()]
+    assert packed.within(large)[1][1] > packed.MOST
+
+
 def test_mirror_images_take_a_quarter() -> None:
     """Between two planes that hold the poles, of four numbers of a wave one is not zero: no symmetry is told."""
     codes = packed.encode(blocks())

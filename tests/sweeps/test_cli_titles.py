@@ -56,7 +56,7 @@ def test_a_shape_is_called_by_its_preset_or_its_table(tmp_path: Path, titles: li
         ("--preset", "jujube1"),
         ("--preset", "jujube2"),
         ("--preset", "wolfberry"),
-        ("--name", "wolfberry"),
+        ("--name", "wolfberry", "--set", "te=0.005", "--set", "gamma=10"),
         ("--set", "te=0.034", "--set", "gamma=22"),
     ):
         asked = ("query", *words, "--stages", "0.2", "--resolution", 16, "--out", tmp_path / "shape.png")
