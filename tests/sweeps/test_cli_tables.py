@@ -308,7 +308,8 @@ def test_presets_and_what_the_package_covers(tmp_path: Path) -> None:
     assert "did you mean 'raisin'?" in wrong.stderr
     far = wizen("query", "--preset", "raisin", "--set", "te=0.1", "--stages", "0.2")
     assert far.exit_code != 0
-    assert "no table holds this; the nearest is" in far.stderr
+    assert "no table holds this; the preset's own is 'raisin'" in far.stderr
+    assert "Set te=0.0125." in far.stderr
     assert "wizen solve dehydration --preset raisin --set te=0.1 --stages 0.2" in far.stderr
     off = wizen("query", "--preset", "raisin", "--stages", "10")
     assert off.exit_code == 2
