@@ -149,6 +149,19 @@ def test_errors_of_runs_held_out_are_covered_as_is_said() -> None:
     assert f"Of all 72 it covers {rough} % in roughness and {others.min()} to {others.max()} % in the rest" in page
 
 
+def test_controls_come_to_the_stored_samples_as_is_said() -> None:
+    runs = figures.load("dehydration-controls")["runs"]
+    anew = [run for run in runs if "anew" in run]
+    assert len(anew) == 13
+    for run in anew:
+        assert min(run["anew"]["correlation"]) > 0.9995
+        assert all(run["anew"][name] == values for name, values in run["stored"].items())
+    off = max(abs(run["cold"]["roughness"][-1] / run["stored"]["roughness"][-1] - 1) for run in runs)
+    page = " ".join(_page("docs/maps.md").split())
+    assert "every one of the thirteen is the stored sample: correlations of 1.00 and the very same numbers" in page
+    assert f"whose roughness at s = 0.3 is within {np.ceil(100 * off):.0f} % of theirs" in page
+
+
 def test_slow_frames_of_painting_are_as_slow_as_is_said() -> None:
     rows = figures.load("growth-painting")["table"]["rows"]
     page = _page("docs/growth.md")
