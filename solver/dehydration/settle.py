@@ -30,6 +30,11 @@ _SHARE = 0.5
 #: Likewise in a swing, at each look and where all stands still: a swing goes far, and its pressures with it.
 _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 
+#: Growth of what rest volumes lag by over a swing, and times in a row that it grows so, after which they stay in swings.
+#: Along a long fruit's axis its volume swings to and fro, slower than rest volumes follow: they drive it on, each swing
+#: farther than the one before (the wolfberry of gamma = 7, by 3 in kinetic energy). Nothing that settled grew so twice.
+_DRIVEN, _DRIVEN_TIMES = 1.5, 2
+
 #: Share of the steps that a stage may settle for after which it swings no more: what each swing throws out of balance,
 #: as rest volumes hardly hold it, comes to rest when eased while they follow.
 _SWINGING = 0.75
@@ -200,19 +205,22 @@ def _come_to_rest(
     settings = motion.settings
     residual, drift, behind = np.inf, np.inf, np.inf
     swings = shrinkage > settings.start
-    calm, eases = 0 if swings and not spent else 1, False
+    calm, eases, driven = 0 if swings and not spent else 1, False, 0
     while spent < settings.settle_steps:
-        late, before = spent >= _SWINGING * settings.settle_steps, residual
+        late, before, lagged = spent >= _SWINGING * settings.settle_steps, residual, behind
+        swung = calm == 0 and not (late or eases)
         if late or eases:
             rest = _eased(motion, state, velocity, rest, shrinkage)
         elif calm == 0:
-            rest = _swung(motion, state, velocity, rest, shrinkage)
+            rest = _swung(motion, state, velocity, rest, shrinkage, follows=driven < _DRIVEN_TIMES)
         if late or calm == 0:
             spent += settings.swing_steps
         rested, residual, drift = _calmed(motion, state, velocity, rest, shrinkage)
         spent += rested
         lag = motion.rests(state, rest, shrinkage) / rest
         behind = float(np.sqrt(np.mean(np.square(lag - 1))))
+        if driven < _DRIVEN_TIMES:
+            driven = driven + 1 if swung and behind > _DRIVEN * lagged else 0
         balanced = residual <= settings.residual and drift <= settings.drift
         if balanced and behind <= settings.residual:
             break
@@ -299,18 +307,20 @@ def _followed(motion: Motion, state: Fixed, rest: Floats, shrinkage: float, shar
     return followed
 
 
-def _swung(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> Floats:
+def _swung(
+    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, *, follows: bool = True
+) -> Floats:
     """Let the state fall, or stay where it was if it falls so fast that it leaves the finite; return rest volumes."""
     begin, masses = state.copy(), motion.masses
     try:
-        return _swing(motion, state, velocity, rest, shrinkage)
+        return _swing(motion, state, velocity, rest, shrinkage, follows)
     except Unstable:
         state[:], motion.masses = begin, masses
         velocity[:] = 0
         return rest
 
 
-def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float) -> Floats:
+def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, follows: bool) -> Floats:
     """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy; return rest volumes."""
     settings = motion.settings
     count = SEARCH_EVERY * max(1, round(settings.swing_steps / _LOOKS / SEARCH_EVERY))
@@ -322,5 +332,6 @@ def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrink
         if falls:
             velocity[:] = energy = 0.0
         last = energy
-        rest = _followed(motion, state, rest, shrinkage, _SHARE_STILL if falls else _SHARE_SWINGING)
+        if follows:
+            rest = _followed(motion, state, rest, shrinkage, _SHARE_STILL if falls else _SHARE_SWINGING)
     return rest

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 
 import numpy as np
@@ -143,6 +144,47 @@ def test_volumes_follow_a_swing_a_little_and_more_where_all_stands_still():
     settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
     left = np.log(1.1 / np.array([rest for *_, rest in motion.turns[:5]]))
     assert left[1:] / left[:-1] == pytest.approx([0.85, 0.85, 0.85, 0.8])
+
+
+@pytest.mark.usefixtures("at_first")
+@pytest.mark.parametrize(
+    ("growths", "stay"),
+    [
+        ((1.6, 1.6, 1.6), [4]),  # from the swing after the second growth on
+        ((1.6, 1.6, 0.9, 0.9), [4, 5]),  # whatever comes then
+        ((1.6, 1.4, 1.6, 1.4), []),  # not twice in a row
+        ((1.4, 1.4, 1.4, 1.4), []),
+    ],
+)
+def test_volumes_stay_in_swings_where_each_leaves_them_farther_behind(growths, stay):
+    """They would drive what swings slower than they follow."""
+
+    class Seen(Exception):
+        """There have been swings enough."""
+
+    class Driven(Told):
+        """Nothing balances; each swing leaves rest volumes behind by so much more."""
+
+        def rests(self, state, rest, shrinkage):
+            swings = self.looks().count("S")
+            if swings > len(growths) + 1:
+                raise Seen
+            calmed = self.turns[-1][0] == SETTINGS.calm_damping
+            return rest * (1 + 0.01 * np.prod(growths[: swings - 1])) if calmed else 1.001 * rest
+
+        def residual(self, state, rest, shrinkage, damping):
+            return 9.0 * SETTINGS.residual
+
+    motion = Driven([])
+    with pytest.raises(Seen):
+        settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
+    swings = [
+        [rest for *_, rest in turns]
+        for damping, turns in itertools.groupby(motion.turns, key=lambda turn: turn[0])
+        if damping == SETTINGS.swing_damping
+    ]
+    followed = [len(set(rests)) > 1 for rests in swings[:-1]]  # the last was stopped
+    assert [k for k, follows in enumerate(followed, 1) if not follows] == stay
 
 
 def test_what_is_smooth_is_calmed_alone_at_first():
