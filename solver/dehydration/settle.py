@@ -30,10 +30,11 @@ _SHARE = 0.5
 #: Likewise in a swing, at each look and where all stands still: a swing goes far, and its pressures with it.
 _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 
-#: Growth of what rest volumes lag by over a swing, and times in a row that it grows so, after which they stay in swings.
-#: Along a long fruit's axis its volume swings to and fro, slower than rest volumes follow: they drive it on, each swing
-#: farther than the one before (the wolfberry of gamma = 7, by 3 in kinetic energy). Nothing that settled grew so twice.
-_DRIVEN, _DRIVEN_TIMES = 1.5, 2
+#: Swings in a row that leave rest volumes farther behind than the one before, after which they stay in swings. What
+#: swings slower than they follow they drive on, as the volume of a long fruit may along its axis, or of flesh under a
+#: soft skin: each swing goes farther then (the wolfberry of gamma = 7: by 3 in kinetic energy; spheres of te = 0.02,
+#: gamma = 2 until elements turned inside out). Nothing that settled had two of them (record dehydration-settling).
+_DRIVEN = 2
 
 #: Share of the steps that a stage may settle for after which it swings no more: what each swing throws out of balance,
 #: as rest volumes hardly hold it, comes to rest when eased while they follow.
@@ -212,15 +213,15 @@ def _come_to_rest(
         if late or eases:
             rest = _eased(motion, state, velocity, rest, shrinkage)
         elif calm == 0:
-            rest = _swung(motion, state, velocity, rest, shrinkage, follows=driven < _DRIVEN_TIMES)
+            rest = _swung(motion, state, velocity, rest, shrinkage, follows=driven < _DRIVEN)
         if late or calm == 0:
             spent += settings.swing_steps
         rested, residual, drift = _calmed(motion, state, velocity, rest, shrinkage)
         spent += rested
         lag = motion.rests(state, rest, shrinkage) / rest
         behind = float(np.sqrt(np.mean(np.square(lag - 1))))
-        if driven < _DRIVEN_TIMES:
-            driven = driven + 1 if swung and behind > _DRIVEN * lagged else 0
+        if driven < _DRIVEN:
+            driven = driven + 1 if swung and behind > lagged else 0
         balanced = residual <= settings.residual and drift <= settings.drift
         if balanced and behind <= settings.residual:
             break

@@ -150,10 +150,10 @@ def test_volumes_follow_a_swing_a_little_and_more_where_all_stands_still():
 @pytest.mark.parametrize(
     ("growths", "stay"),
     [
-        ((1.6, 1.6, 1.6), [4]),  # from the swing after the second growth on
-        ((1.6, 1.6, 0.9, 0.9), [4, 5]),  # whatever comes then
-        ((1.6, 1.4, 1.6, 1.4), []),  # not twice in a row
-        ((1.4, 1.4, 1.4, 1.4), []),
+        ((1.1, 1.1, 1.1), [4]),  # from the swing after the second growth on
+        ((1.1, 1.1, 0.9, 0.9), [4, 5]),  # whatever comes then
+        ((1.9, 0.9, 1.9, 0.9), []),  # not twice in a row
+        ((0.9, 0.9, 0.9, 0.9), []),
     ],
 )
 def test_volumes_stay_in_swings_where_each_leaves_them_farther_behind(growths, stay):
