@@ -32,8 +32,8 @@ _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 
 #: Swings in a row that leave rest volumes farther behind than the one before, after which they stay in swings. What
 #: swings slower than they follow they drive on, as the volume of a long fruit may along its axis, or of flesh under a
-#: soft skin: each swing goes farther then (the wolfberry of gamma = 7: by 3 in kinetic energy; spheres of te = 0.02,
-#: gamma = 2 until elements turned inside out). Nothing that settled had two of them (record dehydration-settling).
+#: soft skin: each swing goes farther then (the wolfberry of gamma = 7: by 3 in kinetic energy), and the stage never
+#: settles. Nothing that settled had two of them (record dehydration-settling).
 _DRIVEN = 2
 
 #: Share of the steps that a stage may settle for after which it swings no more: what each swing throws out of balance,
