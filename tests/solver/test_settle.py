@@ -236,8 +236,26 @@ def test_what_each_swing_throws_out_of_balance_is_eased_in_the_end():
     steps = np.cumsum([count for _, count, _ in motion.turns])
     late = steps > 0.75 * SETTINGS.settle_steps + SETTINGS.swing_steps + SETTINGS.calm_steps
     last = [damping for (damping, *_), is_late in zip(motion.turns, late, strict=True) if is_late]
-    assert set(last) == {SETTINGS.calm_damping, EASING}
-    assert {damping for damping, *_ in motion.turns} == {SETTINGS.calm_damping, SETTINGS.swing_damping, EASING}
+    still = {settling._STILL_DAMPING}  # at last
+    assert set(last) - still == {SETTINGS.calm_damping, EASING}
+    assert {damping for damping, *_ in motion.turns} - still == {SETTINGS.calm_damping, SETTINGS.swing_damping, EASING}
+
+
+@pytest.mark.parametrize(("drift", "stands"), [(0.5, True), (2.0, False)])
+def test_what_rings_in_contact_stands_still_at_last(monkeypatch, drift, stands):
+    """If it is at rest: under that damping anything would seem to be."""
+    monkeypatch.setattr(settling, "_way", lambda motion, state, surface: drift * SETTINGS.drift / 4)
+
+    class Ringing(Told):
+        def residual(self, state, rest, shrinkage, damping):
+            return (9.0 if damping < settling._STILL_DAMPING else 0.5) * SETTINGS.residual
+
+    motion = Ringing([])
+    found = settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
+    assert found.drift == pytest.approx(drift * SETTINGS.drift)
+    assert (found.residual == pytest.approx(0.5 * SETTINGS.residual)) == stands
+    still = [count for damping, count, _ in motion.turns if damping == settling._STILL_DAMPING]
+    assert still == ([50] if stands else [])
 
 
 @pytest.mark.usefixtures("at_first")
