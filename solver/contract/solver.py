@@ -251,7 +251,7 @@ class Solver:
         if need.tolerance is not None:
             if "quality" in need.model_fields_set:
                 raise InvalidInput("a tolerance picks the quality, and one is named.", advice="Leave one of them out.")
-            quality = self._quality_for(need.tolerance, max(stages), tuple(of))
+            quality = self._quality_for(need.tolerance, {min(stages), max(stages)}, tuple(of))
         resolution = need.resolution or self.default_resolution[quality]
         if need.region is not None:
             _check_region(need.region, resolution)
@@ -284,12 +284,12 @@ class Solver:
                 advice="Ask for 'position', which is on the lattice, or leave the region out.",
             )
 
-    def _quality_for(self, tolerance: float, last: float, of: tuple[Params, ...]) -> Quality:
-        """Return the cheapest quality whose error is at most `tolerance`, for all parameters."""
+    def _quality_for(self, tolerance: float, ends: Iterable[float], of: tuple[Params, ...]) -> Quality:
+        """Return the cheapest quality whose error is at most `tolerance` at both ends of the stages, for all `of`."""
         best = math.inf
         for quality in _QUALITIES:
             if self.error is not None and of:
-                reached = max(self.error(params, quality, last) for params in of)
+                reached = max(self.error(params, quality, end) for params in of for end in ends)
             else:
                 reached = self.tolerances.get(quality, math.inf)
             if reached <= tolerance:

@@ -94,6 +94,12 @@ def test_the_tolerance_that_a_refusal_says_is_one_that_is_reached(last: float) -
             SOLVER.settle(Need(tolerance=said, stages=(last,)), of=[params])
 
 
+@pytest.mark.parametrize("stages", [(-0.2,), (-0.2, 0.2), (0.2, 0.4)])
+def test_a_tolerance_holds_for_all_stages(stages: tuple[float, ...]) -> None:
+    with pytest.raises(InvalidInput, match="no error was measured"):
+        SOLVER.settle(Need(tolerance=0.5, stages=stages), of=[SOLVER.parse({})])
+
+
 @pytest.mark.parametrize(
     "values", [{"te": 0.005}, {"te": 0.1}, {"gamma": 100.0}, {"r4": 0.8}, {"wy": 0.3}, {"rs1": 0.5, "rs2": 0.5}]
 )

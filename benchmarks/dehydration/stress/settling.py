@@ -93,6 +93,8 @@ def main() -> None:
         _add(sheet, row, base.get(case[:4]))
         if not asked.quick and case not in known:
             sheet.keep()  # a benchmark that is stopped goes on from there
+    if not asked.quick:
+        sheet.keep()
 
 
 def _cases(quick: bool) -> Iterator[tuple[str, float, float, int, str]]:
