@@ -213,11 +213,11 @@ def _come_to_rest(
     spent: steps before, of a state that has swung already.
     """
     settings = motion.settings
-    residual, drift, behind = np.inf, np.inf, np.inf
+    residual, drift, behind, lagged = np.inf, np.inf, np.inf, np.inf
     swings = shrinkage > settings.start
     calm, eases, driven = 0 if swings and not spent else 1, False, 0
     while spent < settings.settle_steps:
-        late, before, lagged = spent >= _SWINGING * settings.settle_steps, residual, behind
+        late, before = spent >= _SWINGING * settings.settle_steps, residual
         swung = calm == 0 and not (late or eases)
         if late or eases:
             rest = _eased(motion, state, velocity, rest, shrinkage)
@@ -231,6 +231,7 @@ def _come_to_rest(
         behind = _rms(lag)
         if driven < _DRIVEN:
             driven = driven + 1 if swung and behind > lagged else 0
+        lagged = behind if swung else np.inf
         balanced = residual <= settings.residual and drift <= settings.drift
         if balanced and behind <= settings.residual:
             break
