@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -30,11 +31,14 @@ _SHARE = 0.5
 #: Likewise in a swing, at each look and where all stands still: a swing goes far, and its pressures with it.
 _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 
-#: Swings in a row that leave rest volumes farther behind than the one before, after which they stay in swings. What
-#: swings slower than they follow they drive on, as the volume of a long fruit may along its axis, or of flesh under a
-#: soft skin: each swing goes farther then (the wolfberry of gamma = 7: by 3 in kinetic energy), until the steps for
-#: swinging are spent. Other skins have no two of them (record dehydration-settling).
+#: Swings in a row that leave a state worse than the one before in all that is asked of it (rest volumes farther behind,
+#: forces farther out of balance, a surface that drifts faster), after which rest volumes stay in swings. What swings
+#: slower than they follow they drive on, as the volume of a long fruit may along its axis, or of flesh under a soft
+#: skin: each swing goes farther then (the wolfberry of gamma = 7: by 3 in kinetic energy), until the steps for swinging
+#: are spent. Other skins have no two of them (record dehydration-settling).
 _DRIVEN = 2
+#: What turns that do not swing leave: no swing is worse than they, nor are they than a swing.
+_NEVER = (math.nan, math.nan, math.nan)
 
 #: Share of the steps that a stage may settle for after which it swings no more: what each swing throws out of balance,
 #: as rest volumes hardly hold it, comes to rest when eased while they follow.
@@ -213,9 +217,9 @@ def _come_to_rest(
     spent: steps before, of a state that has swung already.
     """
     settings = motion.settings
-    residual, drift, behind, lagged = np.inf, np.inf, np.inf, np.inf
+    residual, drift, behind = np.inf, np.inf, np.inf
     swings = shrinkage > settings.start
-    calm, eases, driven = 0 if swings and not spent else 1, False, 0
+    calm, eases, driven, left = 0 if swings and not spent else 1, False, 0, _NEVER
     while spent < settings.settle_steps:
         late, before = spent >= _SWINGING * settings.settle_steps, residual
         swung = calm == 0 and not (late or eases)
@@ -229,9 +233,10 @@ def _come_to_rest(
         spent += rested
         lag = motion.rests(state, rest, shrinkage) / rest
         behind = _rms(lag)
+        now = (residual, drift, behind) if swung else _NEVER
         if driven < _DRIVEN:
-            driven = driven + 1 if swung and behind > lagged else 0
-        lagged = behind if swung else np.inf
+            driven = driven + 1 if all(a > b for a, b in zip(now, left, strict=True)) else 0
+        left = now
         balanced = residual <= settings.residual and drift <= settings.drift
         if balanced and behind <= settings.residual:
             break

@@ -148,35 +148,43 @@ def test_volumes_follow_a_swing_a_little_and_more_where_all_stands_still():
 
 @pytest.mark.usefixtures("at_first")
 @pytest.mark.parametrize(
-    ("lags", "stay"),
+    ("told", "growing", "stay"),
     [
-        ([1, 2, 3, 4, 5], [4, 5]),  # from the swing after the second that leaves them farther behind
-        ([1, 2, 3, 2, 1], [4, 5]),  # whatever comes then
-        ([1, 3, 2, 3, 2], []),  # not twice in a row
-        # the first balances: it is calmed under new volumes, which lag little, and then swings
-        ([1.0, 0.1, 0.1, 0.1, 2, 3, 2, 2], []),
+        ([1, 2, 3, 4, 5], "residual drift behind", [4, 5]),  # from the swing after the second that is worse
+        ([1, 2, 3, 2, 1], "residual drift behind", [4, 5]),  # whatever comes then
+        ([1, 3, 2, 3, 2], "residual drift behind", []),  # not twice in a row
+        ([1, 2, 3, 4, 5], "drift behind", []),
+        ([1, 2, 3, 4, 5], "residual behind", []),
+        ([1, 2, 3, 4, 5], "residual drift", []),
+        # the first balances: it is calmed under new volumes, and then swings
+        ([0, 0.1, 0.1, 0.1, 2, 3, 2, 2], "residual drift behind", []),
     ],
 )
-def test_volumes_stay_in_swings_where_each_leaves_them_farther_behind(lags, stay):
-    """They would drive what swings slower than they follow. `lags`: how far they are behind after each turn [%]."""
+def test_volumes_stay_in_swings_where_each_leaves_it_worse(monkeypatch, told, growing, stay):
+    """They would drive what swings slower than they follow. `told`: how bad it is after each turn."""
+    left, growing = list(told), growing.split()
 
     class Seen(Exception):
         """There have been turns enough."""
 
-    left_behind = list(lags)
+    def bad(what):
+        if not left:
+            raise Seen
+        return left[0] if what in growing or not left[0] else 1
 
     class Driven(Told):
         def rests(self, state, rest, shrinkage):
             if self.turns[-1][0] != SETTINGS.calm_damping:
                 return 1.001 * rest
-            if not left_behind:
-                raise Seen
-            return rest * (1 + left_behind.pop(0) / 100)
+            behind = bad("behind") / 100 or 0.01
+            left.pop(0)
+            return rest * (1 + behind)
 
         def residual(self, state, rest, shrinkage, damping):
-            balances = 0.1 in lags and len(left_behind) == len(lags)
-            return (0.9 if balances else 9.0) * SETTINGS.residual
+            return (9.0 + bad("residual") if bad("residual") else 0.9) * SETTINGS.residual
 
+    # below what counts as drifting, or it would be calmed no longer
+    monkeypatch.setattr(settling, "_way", lambda motion, state, surface: bad("drift") * SETTINGS.drift / 100)
     motion = Driven([])
     with pytest.raises(Seen):
         settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
