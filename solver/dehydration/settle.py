@@ -31,11 +31,11 @@ _SHARE = 0.5
 #: Likewise in a swing, at each look and where all stands still: a swing goes far, and its pressures with it.
 _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 
-#: Swings in a row that leave a state worse than the one before in all that is asked of it (rest volumes farther behind,
-#: forces farther out of balance, a surface that drifts faster), after which rest volumes stay in swings. What swings
-#: slower than they follow they drive on, as the volume of a long fruit may along its axis, or of flesh under a soft
-#: skin: each swing goes farther then (the wolfberry of gamma = 7: by 3 in kinetic energy), until the steps for swinging
-#: are spent. Other skins have no two of them (record dehydration-settling).
+#: Swings in a row that end worse than the one before (faster, forces farther out of balance after it, rest volumes
+#: farther behind), after which rest volumes stay in swings. What swings slower than they follow they drive on, as the
+#: volume of a long fruit may along its axis, or of flesh under a soft skin: each swing goes farther then (the wolfberry
+#: of gamma = 7: by 3 in kinetic energy and more), until the steps for swinging are spent. Other skins have no two of
+#: them (record dehydration-settling).
 _DRIVEN = 2
 #: What turns that do not swing leave: no swing is worse than they, nor are they than a swing.
 _NEVER = (math.nan, math.nan, math.nan)
@@ -227,13 +227,14 @@ def _come_to_rest(
             rest = _eased(motion, state, velocity, rest, shrinkage)
         elif calm == 0:
             rest = _swung(motion, state, velocity, rest, shrinkage, follows=driven < _DRIVEN)
+        speed = kinetic_energy(motion.layout, velocity) if swung else 0.0
         if late or calm == 0:
             spent += settings.swing_steps
         rested, residual, drift = _calmed(motion, state, velocity, rest, shrinkage)
         spent += rested
         lag = motion.rests(state, rest, shrinkage) / rest
         behind = _rms(lag)
-        now = (residual, drift, behind) if swung else _NEVER
+        now = (speed, residual, behind) if swung else _NEVER
         if driven < _DRIVEN:
             driven = driven + 1 if all(a > b for a, b in zip(now, left, strict=True)) else 0
         left = now
