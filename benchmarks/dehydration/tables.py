@@ -20,8 +20,6 @@ __all__ = ["table"]
 
 #: Skins from which a fruit counts as thick.
 _THICK = 0.1
-#: Moduli ratio up to which its skin counts as soft.
-_SOFT = 2.0
 #: Seconds of the paper's own run.
 _PAPER = 7200.0
 _CODES = {
@@ -51,7 +49,6 @@ def table(record: Row, part: str = "") -> str:
         "dehydration-speed": _speed,
         "dehydration-skips": _skips,
         "dehydration-settling changed": _changed,
-        "dehydration-settling soft": _soft,
         "dehydration-settling thick": _thick,
         "dehydration-onward fruits": onward.table,
         "dehydration-meshes": order.table,
@@ -318,7 +315,7 @@ def _changed(record: Row) -> str:
     """Steps over those of things as they are, a seed each, by change and case, and the roughness over theirs."""
     cases: dict[str, dict[str, list[Row]]] = {}
     for run in record["runs"]:
-        if run["te"] < _THICK and run["gamma"] > _SOFT:
+        if run["te"] < _THICK:
             case = f"{run['quality']}, te {run['te']:g}, gamma {run['gamma']:g}"
             cases.setdefault(case, {}).setdefault(run["changed"], []).append(run)
     as_it_is, *changes = next(iter(cases.values()))
@@ -344,25 +341,6 @@ def _seeds(said: Iterable[str]) -> str:
 
 def _missed(run: Row) -> str:
     return "" if run["ends"] == "settled" else f" ({run['ends']})"
-
-
-def _soft(record: Row) -> str:
-    """Steps, the residual of the last stage, and how it ended, as it is and where rest volumes follow every swing."""
-    lines = []
-    for run in record["runs"]:
-        if run["gamma"] <= _SOFT:
-            last = f"{run['stages'][-1]:g}, {1e3 * run['residual'][-1]:.1f}"
-            cells = (
-                f"{run['te']:g}",
-                f"{run['gamma']:g}",
-                run["seed"],
-                run["changed"],
-                f"{run['steps']:,}",
-                last,
-                run["ends"],
-            )
-            lines.append(list(map(str, cells)))
-    return markdown(("te", "gamma", "seed", "changed", "steps", "last stage, its residual [1e-3]", "ends"), lines)
 
 
 def _thick(record: Row) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -31,14 +30,12 @@ _SHARE = 0.5
 #: Likewise in a swing, at each look and where all stands still: a swing goes far, and its pressures with it.
 _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 
-#: Swings in a row that end worse than the one before (faster, forces farther out of balance after it, rest volumes
-#: farther behind), after which rest volumes stay in swings. What swings slower than they follow they drive on, as the
-#: volume of a long fruit may along its axis, or of flesh under a soft skin: each swing goes farther then (the wolfberry
-#: of gamma = 7: by 3 in kinetic energy and more), until the steps for swinging are spent. Other skins have no two of
-#: them (record dehydration-settling).
-_DRIVEN = 2
-#: What turns that do not swing leave: no swing is worse than they, nor are they than a swing.
-_NEVER = (math.nan, math.nan, math.nan)
+#: Growth of what rest volumes lag by from one swing to the next, and swings in a row that it grows so over, after which
+#: they stay in swings, and swings are so many times as long. What swings slower than they follow they drive on, as the
+#: volume of a long fruit along its axis: each swing goes farther then (the wolfberry of gamma = 7: by 3 in kinetic
+#: energy and more), until the steps for swinging are spent. It is slower than a swing is long, too: from rest it would
+#: go a fifth of its way in each. Buckles that grow for three swings leave volumes a third farther behind at most.
+_DRIVEN_BY, _DRIVEN, _SLOWER = 1.5, 2, 4
 
 #: Share of the steps that a stage may settle for after which it swings no more: what each swing throws out of balance,
 #: as rest volumes hardly hold it, comes to rest when eased while they follow.
@@ -217,27 +214,25 @@ def _come_to_rest(
     spent: steps before, of a state that has swung already.
     """
     settings = motion.settings
-    residual, drift, behind = np.inf, np.inf, np.inf
+    residual, drift, behind, lagged = np.inf, np.inf, np.inf, np.inf
     swings = shrinkage > settings.start
-    calm, eases, driven, left = 0 if swings and not spent else 1, False, 0, _NEVER
+    calm, eases, driven = 0 if swings and not spent else 1, False, 0
     while spent < settings.settle_steps:
         late, before = spent >= _SWINGING * settings.settle_steps, residual
         swung = calm == 0 and not (late or eases)
         if late or eases:
             rest = _eased(motion, state, velocity, rest, shrinkage)
         elif calm == 0:
-            rest = _swung(motion, state, velocity, rest, shrinkage, follows=driven < _DRIVEN)
-        speed = kinetic_energy(motion.layout, velocity) if swung else 0.0
+            rest = _swung(motion, state, velocity, rest, shrinkage, held=driven == _DRIVEN)
         if late or calm == 0:
-            spent += settings.swing_steps
+            spent += settings.swing_steps * (_SLOWER if swung and driven == _DRIVEN else 1)
         rested, residual, drift = _calmed(motion, state, velocity, rest, shrinkage)
         spent += rested
         lag = motion.rests(state, rest, shrinkage) / rest
         behind = _rms(lag)
-        now = (speed, residual, behind) if swung else _NEVER
         if driven < _DRIVEN:
-            driven = driven + 1 if all(a > b for a, b in zip(now, left, strict=True)) else 0
-        left = now
+            driven = driven + 1 if swung and behind > _DRIVEN_BY * lagged else 0
+        lagged = behind if swung else np.inf
         balanced = residual <= settings.residual and drift <= settings.drift
         if balanced and behind <= settings.residual:
             break
@@ -341,30 +336,33 @@ def _followed(motion: Motion, state: Fixed, rest: Floats, shrinkage: float, shar
 
 
 def _swung(
-    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, *, follows: bool = True
+    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, *, held: bool = False
 ) -> Floats:
     """Let the state fall, or stay where it was if it falls so fast that it leaves the finite; return rest volumes."""
     begin, masses = state.copy(), motion.masses
     try:
-        return _swing(motion, state, velocity, rest, shrinkage, follows)
+        return _swing(motion, state, velocity, rest, shrinkage, held)
     except Unstable:
         state[:], motion.masses = begin, masses
         velocity[:] = 0
         return rest
 
 
-def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, follows: bool) -> Floats:
-    """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy; return rest volumes."""
+def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, held: bool) -> Floats:
+    """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy; return rest volumes.
+
+    held: they stay, and it swings longer.
+    """
     settings = motion.settings
     count = SEARCH_EVERY * max(1, round(settings.swing_steps / _LOOKS / SEARCH_EVERY))
     last = 0.0
-    for _ in range(round(settings.swing_steps / count)):
+    for _ in range(round(settings.swing_steps / count) * (_SLOWER if held else 1)):
         motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.swing_damping)
         energy = kinetic_energy(motion.layout, velocity)
         falls = energy < last
         if falls:
             velocity[:] = energy = 0.0
         last = energy
-        if follows:
+        if not held:
             rest = _followed(motion, state, rest, shrinkage, _SHARE_STILL if falls else _SHARE_SWINGING)
     return rest
