@@ -30,12 +30,15 @@ _SHARE = 0.5
 #: Likewise in a swing, at each look and where all stands still: a swing goes far, and its pressures with it.
 _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 
-#: Growth of what rest volumes lag by from one swing to the next, and swings in a row that it grows so over, after which
-#: they stay in swings, and swings are so many times as long. What swings slower than they follow they drive on, as the
-#: volume of a long fruit along its axis: each swing goes farther then (the wolfberry of gamma = 7: by 3 in kinetic
-#: energy and more), until the steps for swinging are spent. It is slower than a swing is long, too: from rest it would
-#: go a fifth of its way in each. Buckles that grow for three swings leave volumes a third farther behind at most.
+#: Growth of what rest volumes lag by over a swing that ends faster and farther out of balance than the one before, and
+#: such swings in a row, after which they stay in swings, and swings are so many times as long. What swings slower than
+#: they follow they drive on, as the volume of a long fruit along its axis: each swing goes farther then (the wolfberry
+#: of gamma = 7: by 3 in kinetic energy and more), until the steps for swinging are spent. It is slower than a swing is
+#: long, too: from rest it would go a fifth of its way in each. Buckles that grow for three swings leave volumes a third
+#: farther behind at most, or end slower.
 _DRIVEN_BY, _DRIVEN, _SLOWER = 1.5, 2, 4
+#: How fast, far out of balance and far behind a swing ended, of a turn that did not swing: none is worse.
+_NO_SWING = (np.inf, np.inf, np.inf)
 
 #: Share of the steps that a stage may settle for after which it swings no more: what each swing throws out of balance,
 #: as rest volumes hardly hold it, comes to rest when eased while they follow.
@@ -214,9 +217,9 @@ def _come_to_rest(
     spent: steps before, of a state that has swung already.
     """
     settings = motion.settings
-    residual, drift, behind, lagged = np.inf, np.inf, np.inf, np.inf
+    residual, drift, behind = np.inf, np.inf, np.inf
     swings = shrinkage > settings.start
-    calm, eases, driven = 0 if swings and not spent else 1, False, 0
+    calm, eases, driven, ended = 0 if swings and not spent else 1, False, 0, _NO_SWING
     while spent < settings.settle_steps:
         late, before = spent >= _SWINGING * settings.settle_steps, residual
         swung = calm == 0 and not (late or eases)
@@ -224,15 +227,16 @@ def _come_to_rest(
             rest = _eased(motion, state, velocity, rest, shrinkage)
         elif calm == 0:
             rest = _swung(motion, state, velocity, rest, shrinkage, held=driven == _DRIVEN)
+        speed = kinetic_energy(motion.layout, velocity) if swung else 0.0
         if late or calm == 0:
             spent += settings.swing_steps * (_SLOWER if swung and driven == _DRIVEN else 1)
         rested, residual, drift = _calmed(motion, state, velocity, rest, shrinkage)
         spent += rested
         lag = motion.rests(state, rest, shrinkage) / rest
         behind = _rms(lag)
+        last, ended = ended, (speed, residual, behind) if swung else _NO_SWING
         if driven < _DRIVEN:
-            driven = driven + 1 if swung and behind > _DRIVEN_BY * lagged else 0
-        lagged = behind if swung else np.inf
+            driven = driven + 1 if speed > last[0] and residual > last[1] and behind > _DRIVEN_BY * last[2] else 0
         balanced = residual <= settings.residual and drift <= settings.drift
         if balanced and behind <= settings.residual:
             break

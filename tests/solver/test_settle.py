@@ -148,34 +148,45 @@ def test_volumes_follow_a_swing_a_little_and_more_where_all_stands_still():
 
 @pytest.mark.usefixtures("at_first")
 @pytest.mark.parametrize(
-    ("lags", "stay"),
+    ("told", "growing", "stay"),
     [
-        ([1, 1.6, 2.6, 4.2, 5], [4, 5]),  # from the swing after the second that leaves them half as far again behind
-        ([1, 1.6, 2.6, 2, 1], [4, 5]),  # whatever comes then
-        ([1, 2, 1, 2, 1], []),  # not twice in a row
-        ([1, 1.4, 1.9, 2.6, 3.5], []),
-        # the first balances: it is calmed under new volumes, which lag little, and then swings
-        ([1.0, 0.1, 0.1, 0.1, 2, 4, 2, 2], []),
+        ([1, 1.6, 2.6, 4.2, 5], "speed residual behind", [4, 5]),  # from the swing after the second that is worse
+        ([1, 1.6, 2.6, 2, 1], "speed residual behind", [4, 5]),  # whatever comes then
+        ([1, 2, 1, 2, 1], "speed residual behind", []),  # not twice in a row
+        ([1, 1.4, 1.9, 2.6, 3.5], "speed residual behind", []),
+        ([1, 1.6, 2.6, 4.2, 5], "speed behind", []),
+        ([1, 1.6, 2.6, 4.2, 5], "residual behind", []),
+        ([1, 1.6, 2.6, 4.2, 5], "speed residual", []),
+        # the first balances: it is calmed under new volumes, and then swings
+        ([0, 0.1, 0.1, 0.1, 2, 4, 2, 2], "speed residual behind", []),
     ],
 )
-def test_volumes_stay_in_longer_swings_where_each_leaves_them_farther_behind(lags, stay):
-    """They would drive what swings slower than they follow. `lags`: how far they are behind after each turn [%]."""
-    left = list(lags)
+def test_volumes_stay_in_longer_swings_where_each_ends_worse(told, growing, stay):
+    """They would drive what swings slower than they follow. `told`: how bad it is after each turn."""
+    left, growing = list(told), growing.split()
 
     class Seen(Exception):
         """There have been turns enough."""
 
+    def bad(what):
+        if not left:
+            raise Seen
+        return left[0] if what in growing or not left[0] else 1
+
     class Driven(Told):
+        def run(self, state, velocity, rest, count, a, b, damping):
+            super().run(state, velocity, rest, count, a, b, damping)
+            velocity[:, :3] = bad("speed")
+
         def rests(self, state, rest, shrinkage):
             if self.turns[-1][0] != SETTINGS.calm_damping:
                 return 1.001 * rest
-            if not left:
-                raise Seen
-            return rest * (1 + left.pop(0) / 100)
+            behind = bad("behind") / 100 or 0.01
+            left.pop(0)
+            return rest * (1 + behind)
 
         def residual(self, state, rest, shrinkage, damping):
-            balances = 0.1 in lags and len(left) == len(lags)
-            return (0.9 if balances else 9.0) * SETTINGS.residual
+            return (9.0 + bad("residual") if bad("residual") else 0.9) * SETTINGS.residual
 
     motion = Driven([])
     with pytest.raises(Seen):
