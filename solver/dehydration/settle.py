@@ -35,7 +35,7 @@ _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 #: they follow they drive on, as the volume of a long fruit along its axis: each swing goes farther then (the wolfberry
 #: of gamma = 7: by 3 in kinetic energy and more), until the steps for swinging are spent. It is slower than a swing is
 #: long, too: from rest it would go a fifth of its way in each. Buckles that grow for three swings leave volumes a third
-#: farther behind at most, or end slower.
+#: farther behind at most, or end slower, or nearer to balance.
 _DRIVEN_BY, _DRIVEN, _SLOWER = 1.5, 2, 4
 #: How fast, far out of balance and far behind a swing ended, of a turn that did not swing: none is worse.
 _NO_SWING = (np.inf, np.inf, np.inf)
