@@ -44,7 +44,7 @@ from .kernel.march import SEARCH_EVERY
 from .params import DehydrationParams
 from .settings import Settings
 
-__all__ = ["Motion"]
+__all__ = ["Masses", "Motion"]
 
 Fixed = NDArray[np.int32]
 #: The layout that holds them, the state that they were taken in, and whether they follow closely.

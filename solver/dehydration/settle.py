@@ -12,7 +12,7 @@ from ..arrays import Floats, Singles
 from ..contract import Unstable
 from .kernel import kinetic_energy
 from .kernel.march import SEARCH_EVERY
-from .motion import Motion
+from .motion import Masses, Motion
 
 __all__ = ["State", "settle"]
 
@@ -31,13 +31,13 @@ _SHARE = 0.5
 _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 
 #: Growth of what rest volumes lag by over a swing that ends faster and farther out of balance than the one before, and
-#: such swings in a row, after which they stay in swings, and swings are so many times as long. What swings slower than
-#: they follow they drive on, as the volume of a long fruit along its axis: each swing goes farther then (the wolfberry
-#: of gamma = 7: by 3 in kinetic energy and more), until the steps for swinging are spent. It is slower than a swing is
-#: long, too: from rest it would go a fifth of its way in each. Buckles that grow for three swings leave volumes a third
-#: farther behind at most, or end slower, or nearer to balance.
+#: such swings in a row, after which those are given back, volumes stay in swings, and swings are so many times as long.
+#: What swings slower than they follow they drive on, as the volume of a long fruit along its axis: each swing goes
+#: farther then (the wolfberry of gamma = 7: by 3 in kinetic energy and more), until the steps for swinging are spent.
+#: It is slower than a swing is long, too: from rest it would go a fifth of its way in each. Buckles that grow for three
+#: swings leave volumes a third farther behind at most, or end slower, or nearer to balance.
 _DRIVEN_BY, _DRIVEN, _SLOWER = 1.5, 2, 4
-#: How fast, far out of balance and far behind a swing ended, of a turn that did not swing: none is worse.
+#: How fast, far out of balance and far behind a turn ended that did not swing: none is worse.
 _NO_SWING = (np.inf, np.inf, np.inf)
 
 #: Share of the steps that a stage may settle for after which it swings no more: what each swing throws out of balance,
@@ -219,24 +219,27 @@ def _come_to_rest(
     settings = motion.settings
     residual, drift, behind = np.inf, np.inf, np.inf
     swings = shrinkage > settings.start
-    calm, eases, driven, ended = 0 if swings and not spent else 1, False, 0, _NO_SWING
+    calm, eases, driven = 0 if swings and not spent else 1, False, _Driven()
     while spent < settings.settle_steps:
         late, before = spent >= _SWINGING * settings.settle_steps, residual
         swung = calm == 0 and not (late or eases)
+        if swung:
+            driven.swings(motion, state, rest, (residual, drift, behind))
         if late or eases:
             rest = _eased(motion, state, velocity, rest, shrinkage)
-        elif calm == 0:
-            rest = _swung(motion, state, velocity, rest, shrinkage, held=driven == _DRIVEN)
+        elif swung:
+            rest = _swung(motion, state, velocity, rest, shrinkage, held=driven.held)
         speed = kinetic_energy(motion.layout, velocity) if swung else 0.0
         if late or calm == 0:
-            spent += settings.swing_steps * (_SLOWER if swung and driven == _DRIVEN else 1)
+            spent += settings.swing_steps * (_SLOWER if swung and driven.held else 1)
         rested, residual, drift = _calmed(motion, state, velocity, rest, shrinkage)
         spent += rested
         lag = motion.rests(state, rest, shrinkage) / rest
         behind = _rms(lag)
-        last, ended = ended, (speed, residual, behind) if swung else _NO_SWING
-        if driven < _DRIVEN:
-            driven = driven + 1 if speed > last[0] and residual > last[1] and behind > _DRIVEN_BY * last[2] else 0
+        if driven.ended((speed, residual, behind) if swung else _NO_SWING):
+            rest, (residual, drift, behind) = driven.given_back(motion, state, velocity)
+            eases = False
+            continue
         balanced = residual <= settings.residual and drift <= settings.drift
         if balanced and behind <= settings.residual:
             break
@@ -248,6 +251,38 @@ def _come_to_rest(
         # under new rest volumes what balances stays where it is, or nearly: to swing would throw it far
         calm = _CALM_TURNS if balanced else max(calm - 1, 0)
     return rest, spent, max(residual, behind), drift
+
+
+class _Driven:
+    """Tells by how swings end whether rest volumes that follow drive them; held: they do, and follow no more."""
+
+    def __init__(self) -> None:
+        self.held = False
+        self._count, self._ended = 0, _NO_SWING
+        self._kept: tuple[Fixed, Masses, Floats, tuple[float, float, float]] | None = None
+
+    def swings(self, motion: Motion, state: Fixed, rest: Floats, found: tuple[float, float, float]) -> None:
+        """Keep what a swing begins from that may be the first of those that are driven; found: how settled that is."""
+        if not self._count:
+            self._kept = None if self.held else (state.copy(), motion.masses, rest, found)
+
+    def ended(self, ended: tuple[float, float, float]) -> bool:
+        """Return whether a swing was the last of those that are driven; ended: how fast, out of balance and behind."""
+        last, self._ended = self._ended, ended
+        driven = ended[0] > last[0] and ended[1] > last[1] and ended[2] > _DRIVEN_BY * last[2]
+        self._count = self._count + 1 if driven and not self.held else 0
+        if self._count < _DRIVEN:
+            return False
+        self.held = True
+        return True
+
+    def given_back(self, motion: Motion, state: Fixed, velocity: Singles) -> tuple[Floats, tuple[float, float, float]]:
+        """Put back, at rest, what the first driven swing began from; return rest volumes and how settled it is."""
+        assert self._kept is not None
+        kept, motion.masses, rest, found = self._kept
+        state[:], velocity[:] = kept, 0
+        self._count, self._kept = 0, None
+        return rest, found
 
 
 def _calmed(

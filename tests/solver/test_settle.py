@@ -146,6 +146,44 @@ def test_volumes_follow_a_swing_a_little_and_more_where_all_stands_still():
     assert left[1:] / left[:-1] == pytest.approx([0.85, 0.85, 0.85, 0.8])
 
 
+class Seen(Exception):
+    """There have been turns enough."""
+
+
+class Driven(Told):
+    """Ends each turn as badly as told, in what is to grow of its speed, residual and how far volumes are behind.
+
+    begins: state, masses, rest volumes and velocity at the begin of each swing.
+    """
+
+    def __init__(self, told, growing):
+        super().__init__([])
+        self.told, self.growing, self.begins = list(told), growing.split(), []
+
+    def bad(self, what):
+        if not self.told:
+            raise Seen
+        return self.told[0] if what in self.growing or not self.told[0] else 1
+
+    def run(self, state, velocity, rest, count, a, b, damping):
+        if damping == SETTINGS.swing_damping and (not self.turns or self.turns[-1][0] != damping):
+            self.begins.append((float(state[0, 0]), self.masses, float(rest[0]), float(velocity[0, 0])))
+        super().run(state, velocity, rest, count, a, b, damping)
+        state[:] += 1
+        self.masses = len(self.turns)
+        velocity[:, :3] = self.bad("speed")
+
+    def rests(self, state, rest, shrinkage):
+        if self.turns[-1][0] != SETTINGS.calm_damping:
+            return 1.001 * rest
+        behind = self.bad("behind") / 100 or 0.01
+        self.told.pop(0)
+        return rest * (1 + behind)
+
+    def residual(self, state, rest, shrinkage, damping):
+        return (9.0 + self.bad("residual") if self.bad("residual") else 0.9) * SETTINGS.residual
+
+
 @pytest.mark.usefixtures("at_first")
 @pytest.mark.parametrize(
     ("told", "growing", "stay"),
@@ -162,33 +200,8 @@ def test_volumes_follow_a_swing_a_little_and_more_where_all_stands_still():
     ],
 )
 def test_volumes_stay_in_longer_swings_where_each_ends_worse(told, growing, stay):
-    """They would drive what swings slower than they follow. `told`: how bad it is after each turn."""
-    left, growing = list(told), growing.split()
-
-    class Seen(Exception):
-        """There have been turns enough."""
-
-    def bad(what):
-        if not left:
-            raise Seen
-        return left[0] if what in growing or not left[0] else 1
-
-    class Driven(Told):
-        def run(self, state, velocity, rest, count, a, b, damping):
-            super().run(state, velocity, rest, count, a, b, damping)
-            velocity[:, :3] = bad("speed")
-
-        def rests(self, state, rest, shrinkage):
-            if self.turns[-1][0] != SETTINGS.calm_damping:
-                return 1.001 * rest
-            behind = bad("behind") / 100 or 0.01
-            left.pop(0)
-            return rest * (1 + behind)
-
-        def residual(self, state, rest, shrinkage, damping):
-            return (9.0 + bad("residual") if bad("residual") else 0.9) * SETTINGS.residual
-
-    motion = Driven([])
+    """They would drive what swings slower than they follow."""
+    motion = Driven(told, growing)
     with pytest.raises(Seen):
         settle(motion, np.zeros((1, 4)), np.zeros((1, 4)), np.ones(1), 0.2)
     swings = [
@@ -200,6 +213,26 @@ def test_volumes_stay_in_longer_swings_where_each_ends_worse(told, growing, stay
     longer = [k for k, rests in enumerate(swings[:5], 1) if len(rests) == 4 * len(swings[0])]
     assert len(swings) >= 5
     assert held == longer == stay
+
+
+@pytest.mark.usefixtures("at_first")
+@pytest.mark.parametrize(
+    ("told", "same"),
+    [
+        ([1, 1.6, 2.6, 4.2, 5], {3: 1}),  # the fourth from where the second began, and no other
+        ([1, 1.6, 1, 1.6, 2.6, 4.2], {5: 3}),
+        ([1, 1.4, 1.9, 2.6, 3.5], {}),
+    ],
+)
+def test_swings_that_were_driven_are_given_back(told, same):
+    """State, masses and rest volumes are those of before the first of them, and all stands still."""
+    motion = Driven(told, "speed residual behind")
+    state, velocity = np.zeros((1, 4)), np.zeros((1, 4))
+    with pytest.raises(Seen):
+        settle(motion, state, velocity, np.ones(1), 0.2)
+    places = [begin[:3] for begin in motion.begins]
+    assert {k: places.index(place) for k, place in enumerate(places) if place in places[:k]} == same
+    assert [motion.begins[k][3] for k in same] == [0.0] * len(same)
 
 
 def test_what_is_smooth_is_calmed_alone_at_first():
