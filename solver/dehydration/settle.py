@@ -228,15 +228,14 @@ def _come_to_rest(
         if late or eases:
             rest = _eased(motion, state, velocity, rest, shrinkage)
         elif swung:
-            rest = _swung(motion, state, velocity, rest, shrinkage, held=driven.held)
-        speed = kinetic_energy(motion.layout, velocity) if swung else 0.0
+            rest = _swung(motion, state, velocity, rest, shrinkage, driven)
         if late or calm == 0:
             spent += settings.swing_steps * (_SLOWER if swung and driven.held else 1)
         rested, residual, drift = _calmed(motion, state, velocity, rest, shrinkage)
         spent += rested
         lag = motion.rests(state, rest, shrinkage) / rest
         behind = _rms(lag)
-        if driven.ended((speed, residual, behind) if swung else _NO_SWING):
+        if driven.ended((driven.speed, residual, behind) if swung else _NO_SWING):
             rest, (residual, drift, behind) = driven.given_back(motion, state, velocity)
             eases = False
             continue
@@ -254,10 +253,14 @@ def _come_to_rest(
 
 
 class _Driven:
-    """Tells by how swings end whether rest volumes that follow drive them; held: they do, and follow no more."""
+    """Tells by how swings end whether rest volumes that follow drive them.
+
+    speed: kinetic energy at the last look of a swing, whether or not all stood still then. held: they are driven, and
+    volumes follow no more.
+    """
 
     def __init__(self) -> None:
-        self.held = False
+        self.speed, self.held = 0.0, False
         self._count, self._ended = 0, _NO_SWING
         self._kept: tuple[Fixed, Masses, Floats, tuple[float, float, float]] | None = None
 
@@ -271,10 +274,8 @@ class _Driven:
         last, self._ended = self._ended, ended
         driven = ended[0] > last[0] and ended[1] > last[1] and ended[2] > _DRIVEN_BY * last[2]
         self._count = self._count + 1 if driven and not self.held else 0
-        if self._count < _DRIVEN:
-            return False
-        self.held = True
-        return True
+        self.held = self.held or self._count == _DRIVEN
+        return self._count == _DRIVEN
 
     def given_back(self, motion: Motion, state: Fixed, velocity: Singles) -> tuple[Floats, tuple[float, float, float]]:
         """Put back, at rest, what the first driven swing began from; return rest volumes and how settled it is."""
@@ -375,33 +376,38 @@ def _followed(motion: Motion, state: Fixed, rest: Floats, shrinkage: float, shar
 
 
 def _swung(
-    motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, *, held: bool = False
+    motion: Motion,
+    state: Fixed,
+    velocity: Singles,
+    rest: Floats,
+    shrinkage: float,
+    driven: _Driven | None = None,
 ) -> Floats:
     """Let the state fall, or stay where it was if it falls so fast that it leaves the finite; return rest volumes."""
     begin, masses = state.copy(), motion.masses
     try:
-        return _swing(motion, state, velocity, rest, shrinkage, held)
+        return _swing(motion, state, velocity, rest, shrinkage, driven or _Driven())
     except Unstable:
         state[:], motion.masses = begin, masses
         velocity[:] = 0
         return rest
 
 
-def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, held: bool) -> Floats:
+def _swing(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shrinkage: float, driven: _Driven) -> Floats:
     """Let the state fall for `swing_steps`, standing still at each peak of the kinetic energy; return rest volumes.
 
-    held: they stay, and it swings longer.
+    driven: takes the speed; where it is held they stay, and it swings longer.
     """
     settings = motion.settings
     count = SEARCH_EVERY * max(1, round(settings.swing_steps / _LOOKS / SEARCH_EVERY))
     last = 0.0
-    for _ in range(round(settings.swing_steps / count) * (_SLOWER if held else 1)):
+    for _ in range(round(settings.swing_steps / count) * (_SLOWER if driven.held else 1)):
         motion.run(state, velocity, rest, count, shrinkage, shrinkage, settings.swing_damping)
-        energy = kinetic_energy(motion.layout, velocity)
+        energy = driven.speed = kinetic_energy(motion.layout, velocity)
         falls = energy < last
         if falls:
             velocity[:] = energy = 0.0
         last = energy
-        if not held:
+        if not driven.held:
             rest = _followed(motion, state, rest, shrinkage, _SHARE_STILL if falls else _SHARE_SWINGING)
     return rest
