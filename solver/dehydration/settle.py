@@ -37,6 +37,9 @@ _SHARE_SWINGING, _SHARE_STILL = 0.15, 0.2
 #: It is slower than a swing is long, too: from rest it would go a fifth of its way in each. Buckles that grow for three
 #: swings leave volumes a third farther behind at most, or end slower, or nearer to balance.
 _DRIVEN_BY, _DRIVEN, _SLOWER = 1.5, 2, 4
+#: Swings in a row, the last of which ends faster, farther out of balance and farther behind than the first, after which
+#: it is so, too: to and fro where the one is not a multiple of the other (the wolfberry of te = 0.0056), or slowly.
+_DRIVEN_ON = 8
 #: How fast, far out of balance and far behind a turn ended that did not swing: none is worse.
 _NO_SWING = (np.inf, np.inf, np.inf)
 
@@ -262,6 +265,7 @@ class _Driven:
     def __init__(self) -> None:
         self.speed, self.held = 0.0, False
         self._count, self._ended = 0, _NO_SWING
+        self._row, self._first = 0, _NO_SWING
         self._kept: tuple[Fixed, Masses, Floats, tuple[float, float, float]] | None = None
 
     def swings(self, motion: Motion, state: Fixed, rest: Floats, found: tuple[float, float, float]) -> None:
@@ -272,10 +276,16 @@ class _Driven:
     def ended(self, ended: tuple[float, float, float]) -> bool:
         """Return whether a swing was the last of those that are driven; ended: how fast, out of balance and behind."""
         last, self._ended = self._ended, ended
-        driven = ended[0] > last[0] and ended[1] > last[1] and ended[2] > _DRIVEN_BY * last[2]
-        self._count = self._count + 1 if driven and not self.held else 0
-        self.held = self.held or self._count == _DRIVEN
-        return self._count == _DRIVEN
+        worse = ended[0] > last[0] and ended[1] > last[1] and ended[2] > _DRIVEN_BY * last[2]
+        self._count = self._count + 1 if worse else 0
+        self._row = self._row + 1 if ended is not _NO_SWING else 0
+        if self._row == 1:
+            self._first = ended
+        on = self._row >= _DRIVEN_ON and all(now > then for now, then in zip(ended, self._first, strict=True))
+        if self.held or not (on or self._count == _DRIVEN):
+            return False
+        self.held = True
+        return True
 
     def given_back(self, motion: Motion, state: Fixed, velocity: Singles) -> tuple[Floats, tuple[float, float, float]]:
         """Put back, at rest, what the first driven swing began from; return rest volumes and how settled it is."""
