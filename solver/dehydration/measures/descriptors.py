@@ -62,9 +62,9 @@ class Surface:
         position = self._fresh + shift
         area = self._area / self._area.sum()
         mean_radius = float((area * np.linalg.norm(position, axis=-1)).sum())
-        radial = np.einsum("tpi,tpi->tp", shift, self._ray)
+        radial = self._along_rays(shift)
         wrinkles = remove_low(radial, LOWEST_DEGREE)
-        spectrum = power(analyse(radial, DEGREE))[LOWEST_DEGREE:]
+        spectrum = _spectrum(radial)
         roughness = float(np.sqrt(spectrum.sum()))
         volume = self._volume(nodes)
         if roughness < SMOOTH:
@@ -82,6 +82,15 @@ class Surface:
             self._anisotropy(wrinkles),
         )
 
+    def roughness(self, nodes: Floats) -> float:
+        """Return the roughness of the deformed surface nodes (nc, 3) alone, units of r1."""
+        radial = self._along_rays(self._sampler(nodes - self._fresh_nodes))
+        return float(np.sqrt(_spectrum(radial).sum()))
+
+    def _along_rays(self, shift: Floats) -> Floats:
+        radial: Floats = np.einsum("tpi,tpi->tp", shift, self._ray)
+        return radial
+
     def _volume(self, nodes: Floats) -> float:
         corners = nodes[self._mesh.sphere.quads]
         # a bilinear quad's flux is that of the mean of its two triangulations
@@ -98,6 +107,11 @@ class Surface:
         a = float((weight * slope_along**2).sum())
         b = float((weight * slope_around**2).sum())
         return (b - a) / (b + a)
+
+
+def _spectrum(radial: Floats) -> Floats:
+    """Return the power of a field on the lattice by degree, from that of wrinkles on."""
+    return power(analyse(radial, DEGREE))[LOWEST_DEGREE:]
 
 
 def _valleys(wrinkles: Floats, level: float) -> int:
