@@ -201,9 +201,9 @@ class Motion:
 
     def settle_inside(
         self, state: Fixed, velocity: Singles, rest: Floats, count: int, shrinkage: float, damping: float
-    ) -> Floats:
-        """Let all but the surface nodes move, which stay where they are, touching or not; return the rest volumes that
-        go with the new pressures. Velocities of the surface nodes are to be 0.
+    ) -> None:
+        """Let all but the surface nodes move, which stay where they are, touching or not. Velocities of the surface
+        nodes are to be 0.
         """
         self._context.check_cancelled()
         self.drive.lead(state, shrinkage)
@@ -213,7 +213,6 @@ class Motion:
         theta = 1 - shrinkage
         march(held, state, velocity, count, theta=(theta, theta), damping=damping, one_point=True)
         self._arrive(state, count, shrinkage)
-        return self._followed(state, rest, count, shrinkage, damping)
 
     def _followed(self, state: Fixed, rest: Floats, count: int, shrinkage: float, damping: float) -> Floats:
         """Return the rest volumes that go with the pressures after `count` steps at this damping."""

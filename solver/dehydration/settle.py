@@ -14,7 +14,7 @@ from .kernel import kinetic_energy
 from .kernel.march import SEARCH_EVERY
 from .motion import Masses, Motion
 
-__all__ = ["State", "settle"]
+__all__ = ["State", "lagging", "settle"]
 
 Fixed = NDArray[np.int32]
 
@@ -79,11 +79,10 @@ _TRIAL_SWINGS, _LEFT, _LEFT_BUCKLED = 4, 0.05, 0.25
 class State:
     """A settled stage: nodes of the outer surface (nc, 3), how settled it is, and the steps spent so far.
 
-    residual: out-of-balance force over internal force or, if larger, by how much rest volumes lag (rms), which relaxed
-    shapes leave out. drift: rms motion of the surface in 200 steps, by the last that were looked at, in exocarp
-    thicknesses. least_ratio: least J/Jd of all integration points. energy: strain energy in mu r1^3, and released: by
-    how much settling lowered it, where they were asked for. rest: rest volumes (ne,) of the elements, which go with
-    their pressures.
+    residual: out-of-balance force over internal force or, if larger, by how much rest volumes lag (rms). drift: rms
+    motion of the surface in 200 steps, by the last that were looked at, in exocarp thicknesses. least_ratio: least J/Jd
+    of all integration points. energy: strain energy in mu r1^3, and released: by how much settling lowered it, where
+    they were asked for. rest: rest volumes (ne,) of the elements, which go with their pressures.
     """
 
     surface: Floats
@@ -239,7 +238,7 @@ def _come_to_rest(
         rested, residual, drift = _calmed(motion, state, velocity, rest, shrinkage)
         spent += rested
         lag = motion.rests(state, rest, shrinkage) / rest
-        behind = _rms(lag)
+        behind = lagging(lag)
         if driven.ended((driven.speed, residual, behind) if swung else _NO_SWING):
             rest, (residual, drift, behind) = driven.given_back(motion, state, velocity)
             eases = False
@@ -331,10 +330,10 @@ def _stilled(motion: Motion, state: Fixed, velocity: Singles, rest: Floats, shri
         motion.run(state, velocity, rest, _CALM_LOOK, shrinkage, shrinkage, _STILL_DAMPING)
         residual = motion.residual(state, rest, shrinkage, _STILL_DAMPING)
         rested += _CALM_LOOK
-    return max(residual, _rms(motion.rests(state, rest, shrinkage) / rest))
+    return max(residual, lagging(motion.rests(state, rest, shrinkage) / rest))
 
 
-def _rms(lag: Floats) -> float:
+def lagging(lag: Floats) -> float:
     """Return by how much rest volumes lag, from what they are to be over what they are."""
     return float(np.sqrt(np.mean(np.square(lag - 1))))
 

@@ -120,7 +120,7 @@ def test_a_run_of_a_table_is_as_rough_as_before() -> None:
     assert distance is not None
     assert distance.residual <= RESIDUAL
     assert abs(distance.rgh - 1) < 0.005
-    assert distance.moved < 0.06
+    assert distance.moved < 0.012  # .024 under a damping of .2, which holds back what is slow inside
 
 
 def test_how_far_a_long_fruit_moves_is_told_over_its_wrinkles() -> None:
