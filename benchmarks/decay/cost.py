@@ -6,6 +6,7 @@ of log cost over log points and of cost over listed points.
 
 from __future__ import annotations
 
+import argparse
 import time
 
 import numpy as np
@@ -44,6 +45,7 @@ def measured(cells: int, share: float) -> tuple[int, float]:
 
 def main() -> None:
     """Print the table and the slopes."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     measured(8, 0.5)
     shares = [f"{100 * share:g} %" for share in _SHARES]
     sheet = Sheet("decay-cost", ("points", *shares, "idle + per listed point"), "decay")

@@ -10,6 +10,8 @@ fruit's weight, with a water activity of 0.98 and Magnus' formula.
 
 from __future__ import annotations
 
+import argparse
+
 import numpy as np
 import xarray as xr
 
@@ -83,6 +85,7 @@ def by_hand(preset: str) -> tuple[float, float]:
 
 def main() -> None:
     """Print both tables."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     head = ("fruit", "day", "weight", "water lost", "juice", "respired", "volume", "density", "rotten")
     sheet = Sheet("decay-mass", (*head, "density, all days", "closed to"), "decay")
     for preset in PRESETS:

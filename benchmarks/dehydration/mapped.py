@@ -7,6 +7,7 @@ standard error is from the fruits that several families hold, each by its own pa
 
 from __future__ import annotations
 
+import argparse
 import json
 import math
 from collections.abc import Iterator
@@ -52,6 +53,7 @@ def read(params: DehydrationParams, table: ShapeTable, place: dict[str, float]) 
 
 
 def main() -> None:
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     plans: dict[str, list[Pattern]] = {name: [] for name in ("fig7", "fig8", "fig9", "fig10", "table1")}
     runs = []
     for family, params, table, place in samples(Store.open(starter.ROOT)):

@@ -7,6 +7,7 @@ once, outside of the ratios.
 
 from __future__ import annotations
 
+import argparse
 import time
 from collections.abc import Callable
 from typing import Any
@@ -106,6 +107,7 @@ def measured(make: Callable[[], Made]) -> dict[str, Any]:
 
 def main() -> None:
     """Measure all users and keep what came of it."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     whose = ("ours", *_KINDS)
     head = ["user", "unknowns", *(f"{name} [ms]" for name in ("ours", "MKL, definite", "MKL, indefinite"))]
     ratios = [f"ours / MKL, {name}" for name in _KINDS]

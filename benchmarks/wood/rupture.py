@@ -7,6 +7,7 @@ load on the whole section keeps it from warping, a load on top does not. No code
 
 from __future__ import annotations
 
+import argparse
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -68,6 +69,7 @@ def fibre(wood: Mapping[str, Any], on_top: bool, side: float = 0.025, span: floa
 
 def main() -> None:
     """Print a row for each case and keep all."""
+    argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter).parse_args()
     sheet = Sheet("wood-rupture", _HEAD, "wood")
     wood, published = SPECIES["spruce"], PUBLISHED["spruce"][1]
     limit = wood["strain_limit"] * size_share()
