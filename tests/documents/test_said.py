@@ -24,6 +24,8 @@ from solver.decay.environment import water_lost
 from solver.decay.surfaces.surface import extent
 from solver.dehydration import SOLVER as DEHYDRATION
 from solver.dehydration.settings import choose
+from store import starter
+from store.store import Store
 
 from ._blocks import ROOT
 
@@ -155,13 +157,14 @@ def test_errors_of_runs_held_out_are_covered_as_is_said() -> None:
 def test_controls_come_to_the_stored_samples_as_is_said() -> None:
     runs = figures.load("dehydration-controls")["runs"]
     anew = [run for run in runs if "anew" in run]
-    assert len(anew) == 13
+    assert len(anew) == 16
+    assert {run["family"] for run in runs} == set(Store.open(starter.ROOT).table_names())
     for run in anew:
         assert min(run["anew"]["correlation"]) > 0.9995
         assert all(run["anew"][name] == values for name, values in run["stored"].items())
     off = max(abs(run["cold"]["roughness"][-1] / run["stored"]["roughness"][-1] - 1) for run in runs)
     page = " ".join(_page("docs/maps.md").split())
-    assert "every one of the thirteen is the stored sample: correlations of 1.00 and the very same numbers" in page
+    assert "every one of the sixteen is the stored sample: correlations of 1.00 and the very same numbers" in page
     assert f"whose roughness at s = 0.3 is within {np.ceil(100 * off):.0f} % of theirs" in page
 
 
