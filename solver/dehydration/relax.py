@@ -167,6 +167,7 @@ def _put_on_and_balanced(
     """
     masses = motion.masses
     for increments in _INCREMENTS:
+        context.report(0.0, f"put on in {increments} increments, and held until its inside is at rest")
         try:
             state, velocity, rest = _put_on(motion, target, stage, increments)
             begun = motion.sector.whole(motion.surface(state)), motion.residual(state, rest, stage, _FREE_DAMPING)
