@@ -50,16 +50,15 @@ _HOLDING, _STILL, _TURNS = (0.05, 0.05, 0.02), 0.02, 30
 #: Damping of the turns in which what was pushed on is calmed, volumes following, and the steps of each.
 _CALMING, _TURN = (0.12, 0.12, 0.12, 0.12, 0.06, 0.06), 50
 #: Likewise once forces are within so many times the wanted residual: sooner, what has moved is little; later, what was
-#: balanced by then is thrown back as far (at 2.0 a fruit took 200 to 300 steps more). And again where volumes lag by
-#: more than is wanted when forces are calm.
+#: balanced by then is thrown back as far (at 2.0 a fruit took 200 to 300 steps more). What slid far, so that volumes lag
+#: when forces balance, is calmed as at first: as briefly, or while it still rings, it would be thrown back for ever.
 _PRESSING, _NEAR = (0.12, 0.12, 0.12), 5.0
 #: Damping of what follows: of what rings; of what is left to move once that is calm and the residual within so many
 #: times the wanted one; and of shapes that still slide after so many steps. Then the steps between two looks at the
 #: residual.
 _FREE_DAMPING, _CALM_DAMPING, _CALM, _SLIDING_DAMPING, _PATIENCE, _LOOK = 0.02, 0.01, 2.0, 0.004, 1500, 100
-#: Most steps of all; a shape that has no residual of `RESIDUAL` then says so. What slides by several times its wrinkles
-#: is pressed more than once.
-_MOST = 6000
+#: Most steps of all; a shape that has no residual of `RESIDUAL` then says so.
+_MOST = 4000
 #: Levels of the mesh below the surface that move with it as they are: those of the skin.
 _SKIN = 3
 
@@ -125,8 +124,8 @@ def _balance(
     # however few steps are left, it is looked at once
     while (motion.steps < most or np.isinf(force)) and max(force, lag) > RESIDUAL:
         # what has moved since has other pressures
-        if force <= (_CALM if is_pressed else _NEAR) * RESIDUAL and (lag > RESIDUAL or not is_pressed):
-            for pressing in _PRESSING:
+        if force <= (1.0 if is_pressed else _NEAR) * RESIDUAL:
+            for pressing in _CALMING if is_pressed else _PRESSING:
                 rest = motion.advance(state, velocity, rest, _TURN, stage, stage, pressing)
             is_pressed = True
         before = motion.surface(state)
