@@ -50,8 +50,8 @@ _HOLDING, _STILL, _TURNS = (0.05, 0.05, 0.02), 0.02, 30
 #: Damping of the turns in which what was pushed on is calmed, volumes following, and the steps of each.
 _CALMING, _TURN = (0.12, 0.12, 0.12, 0.12, 0.06, 0.06), 50
 #: Likewise once forces are within so many times the wanted residual: sooner, what has moved is little; later, what was
-#: balanced by then is thrown back as far (at 2.0 a fruit took 200 to 300 steps more). What slid far, so that volumes lag
-#: when forces balance, is calmed as at first: as briefly, or while it still rings, it would be thrown back for ever.
+#: balanced by then is thrown back as far (at 2.0 a fruit took 200 to 300 steps more). What slid far, so that volumes
+#: lag when forces balance, is calmed as at first: as briefly, or while it rings, it would be thrown back for ever.
 _PRESSING, _NEAR = (0.12, 0.12, 0.12), 5.0
 #: Damping of what follows: of what rings; of what is left to move once that is calm and the residual within so many
 #: times the wanted one; and of shapes that still slide after so many steps. Then the steps between two looks at the
