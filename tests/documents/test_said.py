@@ -123,6 +123,15 @@ def test_families_that_miss_goals_are_counted_as_they_are() -> None:
     assert f"their residual is then up to {left:.3f}".replace("0.", ".") in page
 
 
+def test_relaxing_takes_as_long_as_is_said() -> None:
+    rows = figures.load("dehydration-relaxed")["runs"]
+    page = _page("docs/maps.md")
+    assert "Wanted were 1.5 s at preview and 5 s of quarters of te 0.01: met." in page
+    assert max(row["clock"] for row in rows if row["family"] == "preview") <= 1.5
+    assert max(row["clock"] for row in rows if row["family"] == "sphere-01") <= 5
+    assert max(row["residual"] for row in rows) <= 5e-3
+
+
 def test_runs_of_tables_keep_their_roughness_as_is_said() -> None:
     off = defaultdict(list)
     for run in figures.load("dehydration-score")["runs"]:
