@@ -93,8 +93,7 @@ SOLVER = Solver(
     version="19",
     # 13 settles by other ways, to the same limits; 14 goes on from there to the end of the way, 15 on a shorter one; 16
     # holds volumes of skins below te = 0.02 more stiffly while it settles them; 17 dries at fine by default's rungs,
-    # and the others with fewer layers of flesh; 18 and 19 relax looked-up shapes otherwise, and run as
-    # 17 does
+    # and the others with fewer layers of flesh; 18 and 19 relax looked-up shapes otherwise, and run as 17 does
     tables_of=("12", "13", "14", "15", "16", "17", "18"),
     title="Dehydration of core/shell fruits",
     params=DehydrationParams,
